@@ -185,6 +185,14 @@ def tables(study: str) -> str:
     return "\n".join(parts) or not_stored(study)
 
 
+def zero_shot(kind: str) -> str:
+    """Return the shares of controllers on legs that they never met, ``twins`` or ``legs``."""
+    file = f"sim_to_real/zero_shot_{kind}.json"
+    if not stored(file):
+        return not_stored("sim_to_real")
+    return table(file, "summary", *importlib.import_module("studies.sim_to_real").ZERO_SHOT)
+
+
 def limits(study: str) -> str:
     """Return the section Limits of a study's README."""
     text = (STUDIES / study / "README.md").read_text(encoding="utf-8")
@@ -453,4 +461,5 @@ MACROS = {
     "tables": tables,
     "training": training,
     "value": value,
+    "zero_shot": zero_shot,
 }

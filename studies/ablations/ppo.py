@@ -123,11 +123,17 @@ def _task(recipe: Recipe, robot: Robot, seed: int) -> envs.HoppingTask:
 
 
 class LearntTeacher:
-    """A teacher that has learnt by PPO; forgets nothing, as it remembers nothing."""
+    """A teacher that has learnt by PPO; forgets nothing, as it remembers nothing.
+
+    Attributes:
+        pushing: Nothing but False: it knows no phases, (n,).
+        resting: The same, (n,).
+    """
 
     def __init__(self, policy: ActorCriticPolicy, task: envs.HoppingTask) -> None:
         self._policy, self._task = policy, task
         self._full = np.array(task.options.action_torque)
+        self.pushing = self.resting = np.zeros(task.count, bool)
 
     def watch(self, legs: LegSimulator) -> None:
         """Do nothing: the task shows the true state."""

@@ -7,23 +7,46 @@ Table I, and with domain randomisation. What trainings add, luck included, is le
 `prediction`: there the simulations only foretell how high a shipped policy hops on the twins, so
 that ways to identify can be compared by their fits alone. Every stage's results stay in the folder:
 the same command goes on after an interruption, and further methods, twins or seeds add to what is
-there.
+there. In `zero-shot` controllers hop on legs that they have never met, without any training.
 
 Examples:
-  python -m studies.sim_to_real --json transfer.json
+  python -m studies.sim_to_real transfer --json transfer.json
   python -m studies.sim_to_real prediction --json prediction.json
-  python -m studies.sim_to_real --twins 10 --seeds 0 1 2 --jobs 8
-  python -m studies.sim_to_real --twins my_twin.toml other_twin.toml --methods identified cad
+  python -m studies.sim_to_real transfer --twins 10 --seeds 0 1 2 --jobs 8
+  python -m studies.sim_to_real transfer --twins my_twin.toml other_twin.toml --jobs 2
+  python -m studies.sim_to_real zero-shot --controllers universal energy-shaping mpc --twins 100
 """
 
 RESULTS = (
-    "python -m studies.sim_to_real --jobs 2 --folder runs/transfer-fast --json "
+    "python -m studies.sim_to_real zero-shot --twins 100 --seed 3000 --jobs 2 --out "
+    "runs/zero-shot-twins --json studies/sim_to_real/results/zero_shot_twins.json",
+    "hop robots draw legs --count 50 --seed 3000 --out runs/legs && "
+    "python -m studies.sim_to_real zero-shot --folder runs/legs --jobs 2 --out "
+    "runs/zero-shot-legs --json studies/sim_to_real/results/zero_shot_legs.json",
+    "python -m studies.sim_to_real transfer --jobs 2 --folder runs/transfer-fast --json "
     "studies/sim_to_real/results/fast.json",
     "python -m studies.sim_to_real prediction --twins 5 --jobs 2 --json "
     "studies/sim_to_real/results/prediction.json",
 )
 
+ZERO_SHOT = (
+    "controller",
+    "pairs",
+    "within_5mm*100=within 5 mm, %",
+    "within_10mm*100=within 10 mm, %",
+    "within_3_percent*100=within 3 %, %",
+    "closer_than_energy_shaping*100=closer than energy shaping, %",
+    "median_abs_error_m*1000=median error, mm",
+    "median_std_m*1000=std, mm",
+    "skipped_hops=skipped",
+    "body_contacts=body contacts",
+    "would_be_stopped*100=would be stopped, %",
+)
+"""Columns of the tables of zero-shot trials."""
+
 TABLES = (
+    ("table", "zero_shot_twins.json", "summary", *ZERO_SHOT),
+    ("table", "zero_shot_legs.json", "summary", *ZERO_SHOT),
     (
         "table",
         "fast.json",

@@ -3,7 +3,7 @@
 import sys
 
 from studies.shared import main
-from studies.sim_to_real.run import Experiment
+from studies.sim_to_real.run import Options
 
 if __name__ == "__main__":
-    sys.exit(main("sim_to_real", Experiment))
+    sys.exit(main("sim_to_real", Options))

@@ -5,10 +5,9 @@ import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-import tyro
 
 from hopping_leg.arrays import Array
 from hopping_leg.cli.options import Heights, at_least, say
@@ -32,6 +31,7 @@ from hopping_leg.sim_to_real.jobs import work_through
 from hopping_leg.sim_to_real.tables import Row, median_over_twins, overall, tabulate
 from hopping_leg.sim_to_real.transfer import HopTrial, Twin, about, simulated
 from studies.sim_to_real.study import DEFAULT, FORETOLD, Method, Study, choose_methods, find_twins
+from studies.sim_to_real.zero_shot import ZeroShot
 
 Without = Callable[[ModelMismatch], ModelMismatch]
 
@@ -240,7 +240,7 @@ def best_in_own_simulation(study: Study, trials: Sequence[Row]) -> Row:
         return {}
     best = {}
     for method, twin in itertools.product(study.methods, study.twins):
-        seeds = study.seeds if method.trained else study.seeds[:1]
+        seeds = study.seeds[:1] if method.untrained else study.seeds
         scores = {seed: _own_score(study, twin, method, seed) for seed in seeds}
         best[method.name, twin.name] = min(scores, key=scores.__getitem__)
     chosen = [row for row in trials if row["seed"] == best[row["method"], row["twin"]]]
@@ -250,7 +250,7 @@ def best_in_own_simulation(study: Study, trials: Sequence[Row]) -> Row:
 
 def _own_score(study: Study, twin: Twin, method: Method, seed: int) -> float:
     """Return the score of a policy where it was trained, m; less is better."""
-    if not method.trained:
+    if method.untrained:
         return 0.0
     result = read_result(study.training(twin, method, seed).folder)
     return float(result["selected"]["score_m"])
@@ -268,8 +268,8 @@ def predict(study: Study, at_once: int = 1) -> Row:
             options.
     """
     for method in study.methods:
-        if method.ranges != "none" or not method.trained:
-            reason = "trains on many simulations" if method.trained else "has no simulation"
+        if method.ranges != "none" or method.untrained:
+            reason = "has no simulation" if method.untrained else "trains on many simulations"
             raise UsageError(
                 f"The method '{method.name}' {reason}, so that none foretells; name"
                 f" others, e.g. {', '.join(FORETOLD)}."
@@ -316,8 +316,6 @@ def _trial(study: Study, twin: Twin, hopper: str, more: str = "") -> dict[str, A
 class Experiment:
     """What is compared on which twins, and where it is kept."""
 
-    experiment: tyro.conf.Positional[Literal["transfer", "prediction"]] = "transfer"
-    """Train and hop on the twins, or foretell hops."""
     twins: tuple[str, ...] = (str(LEAST_TWINS),)
     """How many twins to draw, or robot files that extend what is believed of them; intervals over
     twins need 20."""
@@ -352,15 +350,13 @@ class Experiment:
     json: Path | None = None
     """Write every number to this file."""
 
-    def measure(self) -> dict[str, Any]:
-        """Run the experiment, print the tables, return every number."""
+    def study(self, methods: tuple[str, ...]) -> Study:
+        """Return the study of some methods; drawn twins are written."""
         at_least(1, jobs=self.jobs)
-
-        foretell = self.experiment == "prediction"
-        study = Study(
+        return Study(
             self.folder,
             find_twins(self.twins, self.folder / "twins"),
-            choose_methods(self._methods()),
+            choose_methods(methods),
             seeds=self.seeds,
             recipe=self.recipe,
             changes=self.set,
@@ -371,21 +367,33 @@ class Experiment:
             repeats=self.repeats,
             effects=self.effects,
         )
-        result = (predict if foretell else transfer)(study, self.jobs)
-        if foretell:
-            show_predictions(result)
-        else:
-            show_transfer(result)
+
+
+@dataclass(frozen=True)
+class Transfer(Experiment):
+    """Train on what is known of each twin, and hop on it."""
+
+    def measure(self) -> dict[str, Any]:
+        """Run the experiment, print the tables, return every number."""
+        asked = DEFAULT if self.methods is None else self.methods
+        asked = asked if not asked or ENERGY_SHAPING in asked else (*asked, ENERGY_SHAPING)
+        result = transfer(self.study(asked), self.jobs)
+        show_transfer(result)
         if best := result.get("best_in_own_simulation"):
             say("\nOf several trainings, those alone that hop best in their own simulation:")
             show_overall(best)
         return result
 
-    def _methods(self) -> tuple[str, ...]:
-        if self.experiment == "prediction":
-            return self.methods or FORETOLD
-        asked = DEFAULT if self.methods is None else self.methods
-        return asked if not asked or ENERGY_SHAPING in asked else (*asked, ENERGY_SHAPING)
+
+@dataclass(frozen=True)
+class Prediction(Experiment):
+    """Let each method's simulation foretell a shipped policy's hops on the twins."""
+
+    def measure(self) -> dict[str, Any]:
+        """Run the experiment, print the numbers and return them."""
+        result = predict(self.study(self.methods or FORETOLD), self.jobs)
+        show_predictions(result)
+        return result
 
 
 def show_predictions(result: dict[str, Any]) -> None:
@@ -399,3 +407,6 @@ def show_predictions(result: dict[str, Any]) -> None:
             f" ({low} to {high})"
         )
     say(*(f"Note: {note}" for note in result["notes"]))
+
+
+Options = Transfer | Prediction | ZeroShot

@@ -58,7 +58,8 @@ class Method:
         ranges: What every leg in training draws for itself, around the robot.
         truth: Whether the twin's own file is the robot, [reality] left out but for the delay:
             what a perfect fit would find.
-        trained: Whether there is a training; energy shaping hops as it is.
+        untrained: Controller that hops as it is; empty where there is a training. It is told the
+            robot that the fit gives, or else the one that the twin extends.
     """
 
     name: str
@@ -67,7 +68,7 @@ class Method:
     robot: str | None = None
     ranges: Randomise = "none"
     truth: bool = False
-    trained: bool = True
+    untrained: str = ""
 
 
 METHODS = {
@@ -90,7 +91,18 @@ METHODS = {
         Method("two-pass", "the paper's two passes of CMA-ES", Fit("two-pass", search="two-pass")),
         Method("one-pass", "the same CMA-ES in one pass", Fit("one-pass", search="one-pass")),
         Method("truth", "true parameters: what a perfect fit would find", truth=True),
-        Method(ENERGY_SHAPING, "energy shaping, tuned, untouched", trained=False),
+        Method(ENERGY_SHAPING, "energy shaping, tuned, untouched", untrained=ENERGY_SHAPING),
+        Method("universal", "`universal`, told the CAD's robot", untrained="universal"),
+        Method(
+            "universal-identified",
+            "`universal`, told what both recordings identify",
+            Fit(),
+            untrained="universal",
+        ),
+        Method("mpc", "`mpc`, told the CAD's robot", untrained="mpc"),
+        Method(
+            "mpc-identified", "`mpc`, told what both recordings identify", Fit(), untrained="mpc"
+        ),
     )
 }
 """Every method by name."""
@@ -228,9 +240,11 @@ class Study:
             twin,
             method.name,
             seed,
-            self.training(twin, method, seed).folder / "policy.onnx" if method.trained else None,
+            None if method.untrained else self.training(twin, method, seed).folder / "policy.onnx",
             self.commands,
             self.repeats,
+            method.untrained,
+            self.source(twin, method) if method.untrained else "",
         )
 
     def records(self) -> list[RecordTwin]:
@@ -261,12 +275,13 @@ class Study:
 
     def trainings(self) -> list[TrainPolicy]:
         """Return all trainings; several twins may share one."""
-        every = (self.training(t, m, s) for s, m, t in self._all() if m.trained)
+        every = (self.training(t, m, s) for s, m, t in self._all() if not m.untrained)
         return list({training.folder: training for training in every}.values())
 
     def hops(self) -> list[HopTrial]:
         """Return all trials; what is not trained has one for each twin."""
-        return [self.hop(t, m, s) for s, m, t in self._all() if m.trained or s == self.seeds[0]]
+        first = self.seeds[0]
+        return [self.hop(t, m, s) for s, m, t in self._all() if s == first or not m.untrained]
 
     def _all(self) -> Iterable[tuple[int, Method, Twin]]:
         return ((s, m, t) for s in self.seeds for m in self.methods for t in self.twins)

@@ -75,7 +75,7 @@ def _controller_times(policy: Policy, calls: int) -> Array:
     """Return the duration of each decision of the controller, us, (calls,)."""
     rng = np.random.default_rng(0)
     shape = (1, SAMPLES, 2)
-    command = np.full((1, SAMPLES), (policy.card.command_low + policy.card.command_high) / 2)
+    command = np.full((1, SAMPLES), sum(policy.command_range) / 2)
     age = np.arange(SAMPLES)[None] / policy.card.rate
     seen = Measurement(rng.standard_normal(shape), rng.standard_normal(shape), command, age)
     policy.reset(1)

@@ -13,7 +13,7 @@ from hopping_leg.sim_to_real.transfer import simulated
 
 pytest.importorskip("torch")
 from studies import shared
-from studies.sim_to_real.run import EFFECTS, Experiment, best_in_own_simulation, without
+from studies.sim_to_real.run import EFFECTS, Options, best_in_own_simulation, without
 from studies.sim_to_real.study import Study, choose_methods, find_twins
 
 
@@ -23,7 +23,7 @@ def study(folder, methods=("identified", "cad"), **options):
 
 
 def main(words):
-    return shared.main("sim_to_real", Experiment, words)
+    return shared.main("sim_to_real", Options, ["transfer", *words])
 
 
 CHEAP = ["--steps", "1", "--repeats", "1", "--commands", "0.3"]
@@ -55,7 +55,7 @@ def test_a_study_is_finished_once_and_grows(tmp_path, capsys):
     assert main([*words, "--twins", "1", "--methods", "truth"]) == 0
     first = json.loads(file.read_text())
     assert first["command"].startswith(
-        "python -m studies.sim_to_real --twins 1 --methods truth --steps 1"
+        "python -m studies.sim_to_real transfer --twins 1 --methods truth --steps 1"
     )
     policy = folder / "training" / "twin-0-truth-seed0" / "policy.onnx"
     made = policy.stat().st_mtime_ns

@@ -1,0 +1,293 @@
+"""Controllers on legs that they have never met, without any tuning: pairs of leg and command."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from hopping_leg import io
+from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.cli.options import Heights, at_least, say
+from hopping_leg.controllers import Controller, RolloutConfig, rollout
+from hopping_leg.controllers.command_schedule import command_range
+from hopping_leg.controllers.registry import ENERGY_SHAPING, MPC_TRUE_STATE, load_controller
+from hopping_leg.controllers.rollout import Rollout
+from hopping_leg.deploy.drive_link import DriveMode, Reply
+from hopping_leg.deploy.safety_limits import hopping_limits
+from hopping_leg.deploy.stop_reasons import SupervisorInput
+from hopping_leg.deploy.supervisor import State, SupervisorState, supervise
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate import entries, runner, statistics, trials
+from hopping_leg.evaluate.tables import millimetres
+from hopping_leg.hop_detection import find_hops, measure_hops
+from hopping_leg.robot import JOINTS, Robot, load_robot, parent_robot
+from hopping_leg.sim_to_real.jobs import StoredJob, work_through
+from hopping_leg.sim_to_real.transfer import disturbance_of, drawn_twin
+
+COMMANDS = (0.22, 0.24, 0.26, 0.28, 0.30, 0.32, 0.34, 0.36, 0.38, 0.40)
+"""Apex heights of a leg of the paper's size, m; others are asked for as many times as much."""
+
+REACHED = 0.005
+"""Median error with which shooting, which knows state and leg, reaches a command, m."""
+
+_UNCOUNTED = 5  # hops at the start of a run
+_SEED = 1000
+_MEASURED = ("position_rad", "velocity_rad_s", "torque_nm")
+_CONTACTS = ("body_contacts", "stop_contacts")
+
+
+def believed_of(source: str) -> Robot:
+    """Return what is told of a leg: of one with [reality] what its file extends, else itself."""
+    robot, parent = load_robot(source), parent_robot(source)
+    if robot.reality.neutral or parent is None:
+        return robot
+    return load_robot(parent)
+
+
+def stopped(run: Rollout, leg: int, robot: Robot) -> bool:
+    """Return whether the supervisor of the real leg would end a run, from the true state."""
+    limits = hopping_limits(robot, 1 / (run.time[1] - run.time[0]))
+    columns = [
+        [run.data[f"{joint}_{name}"][:, leg].tolist() for name in _MEASURED] for joint in JOINTS
+    ]
+    voltage = (limits.voltage_low + limits.voltage_high) / 2
+    state = SupervisorState(State.RUNNING)
+    for tick, time in enumerate(run.time.tolist()):
+        hip, knee = (
+            Reply(q[tick], qd[tick], torque[tick], DriveMode.POSITION, 0, voltage, 20.0, time)
+            for q, qd, torque in columns
+        )
+        state, _ = supervise(limits, state, SupervisorInput(time, 0.0, (hip, knee), (0.0, 0.0)))
+        if state.state is not State.RUNNING:
+            return True
+    return False
+
+
+def pair(run: Rollout, leg: int, command: float, robot: Robot) -> dict[str, Any]:
+    """Return a leg's hops at one command, m, after the fifth.
+
+    A skipped hop, and the whole run of a leg that never hops, err by how much lower it stands.
+    """
+    data = {name: values[:, leg] for name, values in run.data.items()}
+    rate = 1 / (run.time[1] - run.time[0])
+    series = (data["height_m"], data["height_rate_m_s"], data["foot_clearance_m"])
+    hops = measure_hops(*series, rate, _first_counted(*series))
+    missed = hops.skipped if len(hops.apex) else max(hops.skipped, 1)
+    below = np.full(missed, abs(data["height_m"][0] - command))
+    error = np.concatenate([np.abs(hops.apex - command), below])
+    body = np.minimum(data["base_clearance_m"], data["knee_clearance_m"]) <= 0
+    return {
+        "command_m": command,
+        "median_abs_error_m": float(np.median(error)),
+        "mean_abs_error_m": float(error.mean()),
+        "std_m": float(hops.apex.std()) if len(hops.apex) else None,
+        "hops": len(hops.apex),
+        "skipped_hops": hops.skipped,
+        "body_contacts": _times(body),
+        "stop_contacts": _times(data["stop_contact"] > 0),
+        "would_be_stopped": stopped(run, leg, robot),
+    }
+
+
+def _times(happens: BoolArray) -> int:
+    return int(np.count_nonzero(np.diff(happens.astype(int), prepend=0) > 0))
+
+
+def _first_counted(height: Array, velocity: Array, clearance: Array) -> int:
+    """Return the tick after the fifth apex; after a third of the run if there are not so many."""
+    ticks = find_hops(height, velocity, clearance).tick
+    return int(ticks[_UNCOUNTED - 1]) + 1 if len(ticks) > _UNCOUNTED else len(height) // 3
+
+
+@dataclass(frozen=True)
+class ZeroShotTrial(StoredJob):
+    """A controller, told what is believed, on a leg of a robot file at each command."""
+
+    file: Path
+    source: str
+    controller: str
+    commands: tuple[float, ...]
+    seconds: float
+
+    weight: ClassVar[float] = 4.0
+
+    @property
+    def name(self) -> str:
+        """What is done."""
+        return f"{self.controller} on {Path(self.source).stem}"
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """Controller, leg and trials."""
+        believed = believed_of(self.source)
+        return {
+            "controller": entries.fingerprint(self._load(believed)),
+            "robot": load_robot(self.source).digest,
+            "believed": believed.digest,
+            "commands": list(self.commands),
+            "seconds": self.seconds,
+        }
+
+    def run(self, *, quiet: bool) -> None:
+        """Hop at every command and write what was measured."""
+        robot, believed = load_robot(self.source), believed_of(self.source)
+        config = RolloutConfig(robot, disturbance_of(robot), threads=1)
+        controller, commands = self._load(believed), trials.scaled(self.commands, believed)
+        shown = np.clip(commands, *command_range(controller, believed))
+        schedule = np.tile(shown, (round(self.seconds * config.rate), 1))
+        run = rollout(controller, config, schedule, _SEED)
+        pairs = [pair(run, leg, command, robot) for leg, command in enumerate(commands)]
+        io.write_json(self.file, {"asked": self.asked, "pairs": pairs})
+
+    def _load(self, believed: Robot) -> Controller:
+        return load_controller(self.controller, believed, other="accept", simulated=True)
+
+    def pairs(self) -> list[dict[str, Any]]:
+        """Return what was measured."""
+        found = json.loads(self.file.read_text(encoding="utf-8"))["pairs"]
+        where = {"controller": self.controller, "robot": Path(self.source).stem}
+        return [{**where, **row} for row in found]
+
+
+def summarize(pairs: Sequence[dict[str, Any]], controllers: Sequence[str]) -> list[dict[str, Any]]:
+    """Return a row per controller, over the pairs that are reached.
+
+    Shares are of pairs; intervals are 95 % over legs.
+    """
+    shaped = {_place(row): row for row in pairs if row["controller"] == ENERGY_SHAPING}
+    rows = []
+    for name in controllers:
+        own = [row for row in pairs if row["controller"] == name and row["reached"]]
+        errors, heights = (
+            np.array([row[name] for row in own]) for name in ("median_abs_error_m", "command_m")
+        )
+        closer = [
+            row["mean_abs_error_m"] < shaped[_place(row)]["mean_abs_error_m"]
+            for row in own
+            if _place(row) in shaped
+        ]
+        rows.append({
+            "controller": name,
+            "pairs": len(own),
+            **_share(own, "within_5mm", errors <= 0.005),
+            **_share(own, "within_10mm", errors <= 0.010),
+            **_share(own, "within_3_percent", errors <= 0.03 * heights),
+            "closer_than_energy_shaping": float(np.mean(closer)) if closer else None,
+            "median_abs_error_m": float(np.median(errors)) if own else None,
+            "median_std_m": float(np.median([r["std_m"] for r in own if r["std_m"] is not None])),
+            "would_be_stopped": float(np.mean([row["would_be_stopped"] for row in own])),
+            **{key: sum(row[key] for row in own) for key in ("skipped_hops", *_CONTACTS)},
+        })  # fmt: skip
+    return rows
+
+
+def _share(rows: Sequence[dict[str, Any]], name: str, holds: BoolArray) -> dict[str, float | None]:
+    if not rows:
+        return {name: None}
+    legs: dict[str, list[bool]] = {}
+    for row, one in zip(rows, holds.tolist(), strict=True):
+        legs.setdefault(row["robot"], []).append(one)
+    shares = list(legs.values())
+
+    def mean(index: Sequence[int]) -> float:
+        return float(np.mean([one for i in index for one in shares[i]]))
+
+    low, high = statistics.bootstrap(range(len(shares)), mean, 0, statistics.LEAST_TWINS)
+    return {name: float(holds.mean()), f"{name}_low": float(low), f"{name}_high": float(high)}
+
+
+def _place(row: dict[str, Any]) -> tuple[str, float]:
+    return row["robot"], row["command_m"]
+
+
+@dataclass(frozen=True)
+class ZeroShot:
+    """Let controllers hop on legs that they have never met: drawn twins, or a folder's robots."""
+
+    controllers: tuple[str, ...] = ("universal", ENERGY_SHAPING, "mpc")
+    """Names or files of controllers; each is told the robot that a twin's file extends."""
+    twins: int = 100
+    """How many twins to draw."""
+    seed: int = 0
+    """Seed of the first; each has the next."""
+    folder: Path | None = None
+    """Take the robot files of this folder instead; those without [reality] are told as they are."""
+    commands: Heights = COMMANDS
+    """Apex heights, m, for a leg of the paper's size."""
+    seconds: float = 12.0
+    """Duration of each run, s; the first five hops do not count."""
+    jobs: int = 1
+    """Trials at the same time, each in its own process."""
+    out: Path = Path("runs/zero-shot")
+    """Folder for twins and trials; what is there is not done again."""
+    json: Path | None = None
+    """Write every number to this file."""
+
+    def measure(self) -> dict[str, Any]:
+        """Hop, print the summary, return every number."""
+        at_least(1, jobs=self.jobs, twins=self.twins)
+        names = list(dict.fromkeys((MPC_TRUE_STATE, *self.controllers)))
+        sources = self._sources()
+        jobs = [
+            ZeroShotTrial(
+                self.out / "trials" / f"{Path(source).stem}-{Path(name).stem}.json",
+                source, name, self.commands, self.seconds,
+            )
+            for source in sources
+            for name in names
+        ]  # fmt: skip
+        work_through([jobs], self.jobs)
+        pairs = [row for job in jobs for row in job.pairs()]
+        reached = {
+            _place(row)
+            for row in pairs
+            if row["controller"] == MPC_TRUE_STATE and row["median_abs_error_m"] <= REACHED
+        }
+        for row in pairs:
+            row["reached"] = _place(row) in reached
+        summary = summarize(pairs, names)
+        _show(summary, len(reached), len(sources) * len(self.commands))
+        return {
+            "legs": len(sources),
+            "reached": len(reached) / (len(sources) * len(self.commands)),
+            "summary": summary,
+            "pairs": pairs,
+            "versions": runner.software_versions(),
+        }
+
+    def _sources(self) -> list[str]:
+        if self.folder is None:
+            seeds = range(self.seed, self.seed + self.twins)
+            return [drawn_twin(seed, self.out / "twins").source for seed in seeds]
+        files = sorted(map(str, self.folder.glob("*.toml")))
+        if not files:
+            raise UsageError(
+                f"There is no robot file in {self.folder}; make some with `hop robots draw twins"
+                f" --out {self.folder}`."
+            )
+        return files
+
+
+def _show(summary: Sequence[dict[str, Any]], reached: int, every: int) -> None:
+    table = Table(
+        "controller", "within 5 mm, %", "within 10 mm, %", "closer than energy shaping, %",
+        "median, mm", "std, mm", "skipped", "body contacts", "would be stopped, %",
+    )  # fmt: skip
+    for row in summary:
+        shares = (row["within_5mm"], row["within_10mm"], row["closer_than_energy_shaping"])
+        table.add_row(
+            row["controller"],
+            *("–" if share is None else f"{100 * share:.1f}" for share in shares),
+            millimetres(row["median_abs_error_m"]),
+            millimetres(row["median_std_m"]),
+            str(row["skipped_hops"]),
+            str(row["body_contacts"]),
+            f"{100 * row['would_be_stopped']:.1f}",
+        )
+    Console().print(table)
+    say(f"{reached} of {every} pairs of leg and command are within reach of {MPC_TRUE_STATE}.")

@@ -1,0 +1,96 @@
+"""Controllers on legs that they have never met: what is counted, and what is told of a leg."""
+
+import json
+
+import numpy as np
+import pytest
+
+from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.controllers.joint_pd import JointPD
+from hopping_leg.controllers.registry import load_controller
+from hopping_leg.robot import load_robot
+from hopping_leg.sim import NO_NOISE
+from hopping_leg.sim.any_leg import draw_leg
+from hopping_leg.sim.randomization import draw_twin
+
+pytest.importorskip("moteus")
+from studies import shared
+from studies.sim_to_real import zero_shot
+from studies.sim_to_real.run import Options
+from studies.sim_to_real.zero_shot import believed_of, pair, summarize
+
+LEG = load_robot("legv2-identified")
+ROW = {"body_contacts": 0, "stop_contacts": 0, "skipped_hops": 0, "std_m": 0.001,
+       "would_be_stopped": False, "reached": True}  # fmt: skip
+
+
+def row(controller, robot, command, error, **more):
+    errors = {"median_abs_error_m": error, "mean_abs_error_m": error}
+    place = {"controller": controller, "robot": robot, "command_m": command}
+    return {**ROW, **place, **errors, **more}
+
+
+def test_of_a_twin_what_it_extends_is_told_and_of_another_leg_all(tmp_path):
+    draw_twin(3).save(tmp_path / "twin.toml")
+    draw_leg(3).save(tmp_path / "leg.toml")
+    assert believed_of(str(tmp_path / "twin.toml")) == load_robot("legv2")
+    assert believed_of(str(tmp_path / "leg.toml")) == draw_leg(3).robot
+
+
+def test_a_leg_that_stands_misses_by_what_it_stands_too_low_and_one_that_hops_by_its_hops():
+    config = RolloutConfig(LEG, NO_NOISE, threads=1)
+    commands = np.full((1000, 1), 0.3)
+    standing = rollout(JointPD(config.start_posture[None]), config, commands, 0)
+    found = pair(standing, 0, 0.3, LEG)
+    assert found["hops"] == 0
+    assert found["median_abs_error_m"] == pytest.approx(0.3 - standing.data["height_m"][0, 0])
+    assert found["std_m"] is None
+    hopping = rollout(load_controller("energy-shaping", LEG), config, commands, 0)
+    found = pair(hopping, 0, 0.3, LEG)
+    assert 3 <= found["hops"] <= 10, "the first five do not count"
+    assert found["median_abs_error_m"] < 0.01
+    assert not found["would_be_stopped"]
+    hopping.data["knee_velocity_rad_s"][500] = 40.0
+    assert pair(hopping, 0, 0.3, LEG)["would_be_stopped"]
+
+
+def test_shares_are_of_pairs_that_are_reached_and_closeness_is_pair_by_pair():
+    pairs = [
+        row("one", "a", 0.3, 0.002),
+        row("one", "a", 0.4, 0.004),
+        row("one", "b", 0.3, 0.009, would_be_stopped=True),
+        row("one", "b", 0.4, 0.5, reached=False),
+        row("energy-shaping", "a", 0.3, 0.003),
+        row("energy-shaping", "a", 0.4, 0.003),
+        row("energy-shaping", "b", 0.3, 0.02),
+    ]
+    one, shaped = summarize(pairs, ("one", "energy-shaping"))
+    assert one["pairs"] == 3
+    assert one["within_5mm"] == pytest.approx(2 / 3)
+    assert one["within_10mm"] == 1
+    assert one["closer_than_energy_shaping"] == pytest.approx(2 / 3)
+    assert one["would_be_stopped"] == pytest.approx(1 / 3)
+    assert shaped["closer_than_energy_shaping"] == 0
+
+
+def test_the_command_writes_pairs_and_summary_and_goes_on(tmp_path, capsys):
+    robots = tmp_path / "robots"
+    draw_twin(1).save(robots / "twin-1.toml")
+    draw_leg(2).save(robots / "leg-2.toml")
+    words = ["zero-shot", "--controllers", "energy-shaping", "--folder", str(robots)]
+    words += ["--commands", "0.26", "0.32", "--seconds", "5", "--out", str(tmp_path / "out")]
+    words += ["--json", str(tmp_path / "zero.json")]
+    assert shared.main("sim_to_real", Options, words) == 0
+    found = json.loads((tmp_path / "zero.json").read_text())
+    assert {r["controller"] for r in found["pairs"]} == {"energy-shaping", "mpc-true-state"}
+    assert {r["robot"] for r in found["pairs"]} == {"twin-1", "leg-2"}
+    larger = {r["command_m"] for r in found["pairs"] if r["robot"] == "leg-2"}
+    assert larger == set(zero_shot.trials.scaled((0.26, 0.32), draw_leg(2).robot))
+    assert [r["controller"] for r in found["summary"]] == ["mpc-true-state", "energy-shaping"]
+    trials = sorted((tmp_path / "out" / "trials").glob("*.json"))
+    written = [file.stat().st_mtime_ns for file in trials]
+    assert shared.main("sim_to_real", Options, words) == 0
+    assert [file.stat().st_mtime_ns for file in trials] == written
+    capsys.readouterr()
+    assert shared.main("sim_to_real", Options, [*words[:4], str(tmp_path)]) == 2
+    assert "hop robots draw twins" in capsys.readouterr().err
