@@ -127,13 +127,13 @@ class LearntTeacher:
 
     Attributes:
         pushing: Nothing but False: it knows no phases, (n,).
-        resting: The same, (n,).
+        folding: The same, (n,).
     """
 
     def __init__(self, policy: ActorCriticPolicy, task: envs.HoppingTask) -> None:
         self._policy, self._task = policy, task
         self._full = np.array(task.options.action_torque)
-        self.pushing = self.resting = np.zeros(task.count, bool)
+        self.pushing = self.folding = np.zeros(task.count, bool)
 
     def watch(self, legs: LegSimulator) -> None:
         """Do nothing: the task shows the true state."""

@@ -33,7 +33,7 @@ class Counting:
     def pushing(self):
         return np.zeros(self.count, bool)
 
-    resting = pushing
+    folding = pushing
 
     def watch(self, legs):
         pass
@@ -173,7 +173,7 @@ def test_a_push_counts_more_and_what_is_hidden_is_guessed():
     made = learn(learner(TINY_UNIVERSAL), 8 * 32 * 4)
     state = made._buffer.state()
     config = TINY_UNIVERSAL.algorithm
-    assert set(np.unique(state["weights"])) == {1.0, config.push_weight, config.rest_weight}
+    assert set(np.unique(state["weights"])) == {1.0, config.push_weight, config.fold_weight}
     hidden = state["hidden"].reshape(-1, made._hidden.size)
     batch, _, guesses = made.student.recall(made._buffer, 64, made._draws)
     assert guesses.shape == batch.hidden.shape

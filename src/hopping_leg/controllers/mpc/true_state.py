@@ -171,11 +171,13 @@ class TrueStateMpc:
             self._steps[elastic] = round(self.period / how.elastic_timestep)
 
     @property
-    def resting(self) -> BoolArray:
-        """Which legs stand where they have to fold first, (n,)."""
-        landing, rate = self._phase == hop_law.LANDING, self._legs.height_rate
-        resting: BoolArray = landing & (np.abs(rate) < hop_law.REST_SPEED)
-        return resting
+    def folding(self) -> BoolArray:
+        """Which legs have to fold on the ground, (n,): they stand, or have pushed off."""
+        legs = self._legs
+        rests = (self._phase == hop_law.LANDING) & (np.abs(legs.height_rate) < hop_law.REST_SPEED)
+        leaves = (self._phase == hop_law.FLIGHT) & (legs.foot_clearance() <= 0)
+        folding: BoolArray = rests | leaves
+        return folding
 
     @property
     def pushing(self) -> BoolArray:

@@ -62,8 +62,8 @@ class Teacher(Protocol):
         ...
 
     @property
-    def resting(self) -> BoolArray:
-        """Which legs stand where they have to fold first, (n,)."""
+    def folding(self) -> BoolArray:
+        """Which legs have to fold on the ground, (n,): they stand, or have pushed off."""
         ...
 
     def state(self) -> dict[str, Array]:
@@ -95,8 +95,8 @@ class DaggerConfig:
     """How far training goes beyond the highest command, m: calibrated commands may lie there."""
     push_weight: float = 1.0
     """How much a control period counts in which the leg pushes, over others."""
-    rest_weight: float = 1.0
-    """How much one counts in which it stands where it has to fold first."""
+    fold_weight: float = 1.0
+    """How much one counts in which it has to fold on the ground: to hop from rest, to leave it."""
     held_share: float = 0.0
     """Share of episodes that begin with a stiff leg for a while, so that it stands still."""
     outlier: float = 0.0
@@ -224,7 +224,7 @@ class Dagger:
     def _weigh(self) -> Array32:
         config, teacher = self.config, self.teacher
         weight = np.where(teacher.pushing, config.push_weight, 1.0)
-        return np.where(teacher.resting, config.rest_weight, weight).astype(np.float32)
+        return np.where(teacher.folding, config.fold_weight, weight).astype(np.float32)
 
     def _hold(self, action: Array) -> Array:
         """Return what is commanded: at the start of some episodes, the posture that they have."""
