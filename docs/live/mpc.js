@@ -19,6 +19,7 @@ const TOLERANCE = 1e-4; // of the apex, m
 const LIFTED = 0.01; // gap between foot and ground of a leg in the air, m
 const STRETCHED = 0.97; // share of the stretched length at which a push ends in any case
 const FALL = 0.3; // force over the weight with which a leg sinks until it has to brake
+const REST_SPEED = 0.1;
 const LEAST_STROKE = 0.08; // of a landing, over the stretched length
 const LEAST_PUSH = 0.2; // push-off force over the weight
 const MOST_PUSH = 14;
@@ -87,7 +88,7 @@ function law(p, shape, state, hop, phase, torque) {
       // Constant deceleration to rest at the squat; a leg that is slower than it sinks.
       const way = Math.max(state[0] - p.foot_radius - hop.squat, 0.01 * length);
       const slowing = Math.min(state[3], 0) ** 2 / (2 * way);
-      force = FALL * weight;
+      force = (state[3] > -REST_SPEED ? shape.fold : FALL) * weight;
       if (slowing >= hop.stop) {
         force = weight * Math.min(1 + slowing / p.gravity, shape.most_landing);
       }

@@ -35,7 +35,6 @@ REST_SPEED = 0.1
 
 _STRETCHED = 0.97  # share of the stretched length at which a push ends in any case
 _FALL = 0.3  # force over the weight with which a leg sinks until it has to brake
-_DROP = -0.4  # and with which it folds from rest
 _LEAST_STROKE = 0.08  # of a landing, over the stretched length
 _LEAST_PUSH, _MOST_PUSH = 0.2, 14.0  # push-off force over the weight
 _REST = 0.02  # speed of the hip below which a landing ends, m/s
@@ -107,7 +106,7 @@ def law(p: Record, shape: Record, state: Array, hop: Record, phase: int, torque:
             way = max(state[0] - p.foot_radius - hop.squat, 0.01 * length)
             rate = min(state[3], 0.0)
             slowing = rate * rate / (2 * way)
-            force = (_DROP if state[3] > -REST_SPEED else _FALL) * weight
+            force = (shape.fold if state[3] > -REST_SPEED else _FALL) * weight
             if slowing >= hop.stop:
                 force = weight * min(1 + slowing / p.gravity, shape.most_landing)
             leaning = 0.0

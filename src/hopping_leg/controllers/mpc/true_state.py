@@ -64,6 +64,8 @@ class HopShape:
     """Deceleration of the landing from which on the leg brakes, over that of the whole way."""
     most_landing: float = 7.12
     """Largest force on landing."""
+    fold: float = 0.3
+    """Force with which a leg that stands folds; less than nothing pulls the hip down."""
     lean_from: float = 2.0
     """Push-off force beyond which the foot also pushes forward."""
     lean: float = 0.093

@@ -9,7 +9,7 @@ left of a miss corrects its command.
 
 from dataclasses import replace
 
-from hopping_leg.controllers.mpc import Planning
+from hopping_leg.controllers.mpc import HopShape, Planning
 from hopping_leg.controllers.observation_history import AnyLeg
 from hopping_leg.rl import recipe
 from hopping_leg.rl.distillation.dagger import DaggerConfig
@@ -39,6 +39,7 @@ UNIVERSAL = recipe.Recipe(
         held_share=0.3,
         outlier=0.15,
         hidden_weight=0.3,
+        teacher=HopShape(fold=-0.4),
         planning=Planning(
             timestep=1.25e-3, elastic_timestep=5e-4, simulations=3, tolerance=3e-4, every=2
         ),
