@@ -13,14 +13,11 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
+
+from hopping_leg.colours import COLOURS
 
 P = ParamSpec("P")
-
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Okabe and Ito's palette, distinct for all common kinds of colour blindness."""
-
-COMMAND_COLOUR = "0.45"
-"""Colours of commanded heights, as in the paper."""
 
 TORQUE_MAP = "PuOr_r"
 """Diverging and colour-blind safe; white is no torque."""
@@ -63,8 +60,18 @@ def panels(rows: int, columns: int = 1, height: float = 2.2) -> tuple[Figure, li
 
 
 def colour(index: int) -> str:
-    """Return the colour of the n-th controller."""
+    """Return the colour of the n-th curve."""
     return COLOURS[index % len(COLOURS)]
+
+
+def plain_log(axes: Axes, *sides: Literal["x", "y"]) -> None:
+    """Make axes logarithmic, with plain numbers at 1, 2 and 5 of every decade."""
+    for side in sides:
+        getattr(axes, f"set_{side}scale")("log")
+        axis = getattr(axes, f"{side}axis")
+        axis.set_major_locator(LogLocator(10, (1, 2, 5)))
+        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axis.set_minor_locator(NullLocator())
 
 
 def to_svg(figure: Figure) -> bytes:

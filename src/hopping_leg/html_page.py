@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined, Template
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
@@ -14,12 +14,19 @@ from hopping_leg.figure_style import to_svg
 
 
 def page_template(package: str, name: str) -> Template:
-    """Return a template that lies in a package; it finds the common look as ``style``."""
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    """Return a template that lies in a package, beside those it includes.
+
+    It finds the common look as ``style``.
+    """
+    environment = Environment(
+        loader=PackageLoader(package, ""),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+    )
     look = resources.files("hopping_leg") / "report.css"
     environment.globals["style"] = Markup(look.read_text(encoding="utf-8"))
-    text = (resources.files(package) / name).read_text(encoding="utf-8")
-    return environment.from_string(text)
+    return environment.get_template(name)
 
 
 def data_uri(content: bytes, kind: str) -> str:

@@ -16,10 +16,11 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
+from hopping_leg.colours import COLOURS
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.evaluate.runner import software_versions
-from hopping_leg.figure_style import COLOURS, panels, styled, to_svg
+from hopping_leg.figure_style import panels, styled, to_svg
 from hopping_leg.io import write_atomically
 from hopping_leg.rl.policy_evaluation import CommandResult, evaluate_policy
 from hopping_leg.rl.recipes import RECIPES

@@ -10,6 +10,7 @@ from hopping_leg.evaluate.comparison import set_beside, traces_of, write_compari
 from hopping_leg.evaluate.report import write_report
 from hopping_leg.evaluate.result_files import evaluation_from, read_runs
 from hopping_leg.evaluate.trials import save_traces
+from hopping_leg.evaluate.verdict import verdict
 from hopping_leg.evaluate.video import Video
 
 TRAINING = {
@@ -66,7 +67,7 @@ def test_the_page_holds_everything_and_needs_nothing(folders):
     names = [str(folders / name) for name in ("a", "b", "t0", "t1")]
     page = write_comparison(set_beside(read_runs(names)), "hop report page a b").decode()
     sources = re.findall(r'(?:src|href)="([^"]*)"', page)
-    assert len(sources) == 4  # sequence, staircase, distributions, learning curves
+    assert len(sources) == 5  # apexes, distributions, staircase, sequence, learning curves
     assert all(source.startswith("data:") for source in sources)
     for text in (">a: spring<", "hop evaluate b", "hop train --recipe fast", ">4.0<"):
         assert text in page
@@ -156,3 +157,24 @@ def test_a_controller_that_never_hopped_is_reported(judged):
     evaluation = dataclasses.replace(judged.evaluation, summary=rows, distributions=empty)
     page = write_report(EvaluationRun(evaluation, judged.runs)).decode()
     assert "nan" not in re.sub(r"data:[^\"]*", "", page)
+
+
+def test_a_verdict_names_the_worst_height_and_everything_that_went_wrong(judged):
+    low, high = judged.evaluation.summary
+    low = dataclasses.replace(low, median_error_m=-0.001, skipped_hops=0, body_contacts=0)
+    changes = {"median_error_m": 0.0034, "skipped_hops": 2, "hops": 98 - low.hops}
+    high = dataclasses.replace(high, **changes, body_contacts=1)
+
+    def said(*rows):
+        evaluation = dataclasses.replace(
+            judged.evaluation, summary=list(rows), ladder=[], secondary=None
+        )
+        return verdict(evaluation, "spring")
+
+    assert said(low, high) == (
+        "misses its command by 2.2 mm in the median of 2 heights and by 3.4 mm at the worst,"
+        " 0.35 m; skips 2 of 100 hops; base or knee touch the ground once."
+    )
+    still = dataclasses.replace(high, hops=0, median_error_m=float("nan"))
+    assert "does not hop at 0.35 m" in said(low, still)
+    assert said(still) == "does not hop at any height."

@@ -7,11 +7,12 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
+from hopping_leg.colours import COLOURS, controller_colours
 from hopping_leg.evaluate import figures as drawing
 from hopping_leg.evaluate import metrics
 from hopping_leg.evaluate.report import draw_report_figures
 from hopping_leg.evaluate.trials import load_run
-from hopping_leg.evaluate.video import CLIP_SECONDS, FRAME_RATE, clip, fixed_traces, render_video
+from hopping_leg.evaluate.video import CLIP_SECONDS, FRAME_RATE, fixed_traces, render_hops, sample
 from hopping_leg.figure_style import INCHES, encode, fit_width, to_svg
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE, find_hops
 from hopping_leg.trace import Trace
@@ -38,18 +39,35 @@ def fixed(judged):
 
 def test_every_figure_names_its_axes_with_units(judged, fixed):
     figures = [
+        drawing.draw_apexes({"spring": fixed}),
         drawing.draw_heights({"spring": fixed}),
         drawing.draw_distributions(judged.evaluation),
-        drawing.draw_phase_space(fixed),
-        drawing.draw_estimate(with_estimate(fixed)),
+        drawing.draw_phase_space({"spring": fixed}),
+        drawing.draw_estimate({"spring": with_estimate(fixed)}),
     ]
     for figure in figures:
         labels = [axes.get_xlabel() + axes.get_ylabel() for axes in figure.axes]
         assert all("/ " in label for label in labels)
 
 
+def test_controllers_beside_each_other_share_their_axes_and_keep_their_colours(fixed):
+    weak = {"knee_command_nm": 0.1 * fixed.column("knee_command_nm")}
+    slow = Trace(fixed.table.with_columns(**weak), fixed.header)
+    flight, _, other, *_ = drawing.draw_phase_space({"strong": fixed, "weak": slow}).axes
+    assert flight.get_xlim() == other.get_xlim()
+    assert flight.get_ylim() == other.get_ylim()
+    assert flight.collections[0].get_clim() == other.collections[0].get_clim()
+    own = controller_colours(["precise"])["precise"]
+    for names in (["mine", "precise"], ["precise", "mine"]):
+        first = names.index("precise")
+        drawn = drawing.draw_heights(dict.fromkeys(names, fixed)).axes[first].lines[0]
+        assert drawn.get_color() == own
+    five = ["mine", "precise", "a", "b", "energy-shaping"]
+    assert len(set(controller_colours(five).values())) == 5
+
+
 def test_phase_space_shows_flight_and_stance_of_ten_seconds(fixed):
-    flight, stance = drawing.draw_phase_space(fixed).axes[:2]
+    flight, stance = drawing.draw_phase_space({"spring": fixed}).axes[:2]
     points = [len(axes.collections[0].get_offsets()) for axes in (flight, stance)]
     time = fixed.column("time_s")
     shown = (time >= metrics.START_SECONDS) & (time < metrics.START_SECONDS + 10)
@@ -66,10 +84,11 @@ def test_the_gallery_from_stored_traces_is_the_reports(judged, tmp_path):
     ]
     before, after = (draw_report_figures(judged.evaluation, runs) for runs in (judged.runs, again))
     assert [p.name for p in before] == [
-        "sequence",
-        "staircase",
+        "apexes",
         "distributions",
-        "phase-space-spring-fixed-0.350-0",
+        "staircase",
+        "sequence",
+        "phase-space",
     ]
     assert [p.name for p in after] == [p.name for p in before]
     assert to_svg(after[0].figure) == to_svg(before[0].figure)
@@ -131,16 +150,19 @@ def traces(judged):
     return fixed_traces(judged.runs, judged.evaluation.controllers[0])
 
 
-def test_a_clip_begins_at_an_apex_after_the_start(traces):
-    poses = clip(traces[0.35])
-    assert poses.shape == (round(CLIP_SECONDS * FRAME_RATE), 3)
-    assert poses[1, 0] < poses[0, 0]
-    assert np.ptp(poses[:, 0]) > 0.05
+def test_a_clip_has_the_poses_of_the_run_at_its_frames(traces):
+    trace = traces[0.35]
+    poses = np.array(sample(trace, 3.0, CLIP_SECONDS, rate=100))
+    start = int(np.searchsorted(trace.column("time_s"), 3.0 - 1e-9))
+    ticks = slice(start, start + 2 * len(poses), 2)
+    for index, name in enumerate(("height_m", "hip_position_rad", "knee_position_rad")):
+        assert poses[:, index] == pytest.approx(trace.column(name)[ticks])
+    assert set(poses[:, 3]) == {0.35}
 
 
 def test_without_opengl_there_is_a_reason_instead(robot, traces, monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "nonsense")
-    video = render_video(robot, traces)
+    video = render_hops(robot, "spring", COLOURS[0], traces)
     assert video.content is None
     assert video.reason.startswith("nonsense: ")
 
@@ -148,7 +170,7 @@ def test_without_opengl_there_is_a_reason_instead(robot, traces, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["webp", "gif"])
 def test_a_video_moves_or_says_why_there_is_none(kind, robot, traces):
-    video = render_video(robot, traces, kind)
+    video = render_hops(robot, "spring", COLOURS[0], traces, kind)
     if video.content is None:
         assert video.reason
         return

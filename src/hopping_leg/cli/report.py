@@ -22,9 +22,10 @@ import tyro
 
 from hopping_leg import errors, figure_style, io
 from hopping_leg.cli.options import JsonFile, save_json, say, say_written
+from hopping_leg.colours import controller_colours
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.evaluate import aggregation, comparison, report, result_files, runner, trials
-from hopping_leg.evaluate.video import Animation, fixed_traces, render_video
+from hopping_leg.evaluate.video import Animation, fixed_traces, render_hops
 from hopping_leg.progress import said_if_slow
 from hopping_leg.robot import load_robot
 
@@ -101,13 +102,13 @@ def _draw(args: Figures) -> None:
         io.write_atomically(path, figure_style.encode(picture.figure, args.format, args.width))
         say(f"{picture.title}: {path}")
     if args.animation is not None:
-        for name in controllers:
+        for name, colour in controller_colours(controllers).items():
             path = args.out / f"hops-{io.safe_file_name(name)}.{args.animation}"
-            io.write_atomically(path, _animation(runs, name, args.animation))
+            io.write_atomically(path, _animation(runs, name, colour, args.animation))
             say(f"Hops of {name}: {path}")
 
 
-def _animation(runs: Sequence[trials.Run], controller: str, kind: Animation) -> bytes:
+def _animation(runs: Sequence[trials.Run], controller: str, colour: str, kind: Animation) -> bytes:
     traces = fixed_traces(runs, controller)
     if not traces:
         raise errors.UsageError(
@@ -115,7 +116,7 @@ def _animation(runs: Sequence[trials.Run], controller: str, kind: Animation) -> 
             " some of its 'fixed' ones."
         )
     robot = load_robot(str(next(iter(traces.values())).header.get("robot", "")))
-    video = render_video(robot, traces, kind)
+    video = render_hops(robot, controller, colour, traces, kind)
     if video.content is None:
         raise errors.UsageError(f"The hops of {controller} cannot be rendered: {video.reason}.")
     return video.content

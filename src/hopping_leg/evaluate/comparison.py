@@ -9,7 +9,7 @@ from markupsafe import Markup
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import figures, report, result_files, trials
 from hopping_leg.evaluate.result import Evaluation, flat_conditions
-from hopping_leg.evaluate.tables import LOAD, SUMMARY, column, millimetres
+from hopping_leg.evaluate.tables import JOINTS, LOAD, SUMMARY, column, millimetres
 from hopping_leg.html_page import Column, page_template, svg_uri, table
 
 _OF_CONTROLLERS = ("summary", "sequence", "ladder", "staircase", "neighbours", "estimators")
@@ -192,14 +192,19 @@ def write_comparison(compared: Compared, command: str = "") -> bytes:
     rows = [training_row(label, training) for label, training in compared.trainings.items()]
     histories = {label: training["history"] for label, training in compared.trainings.items()}
     pictures = report.pictures_of(evaluation, traces_of(compared)) if evaluation.summary else []
+    for picture in pictures:
+        picture["command"] = ""  # its traces lie in several folders
     page = page_template("hopping_leg.evaluate", "compare.html.j2").render(
         title=f"Compared: {', '.join(run.label for run in compared.runs)}",
         command=command,
-        compared=compared,
+        verdicts=report.verdicts(evaluation),
+        notes=[*compared.notes, *evaluation.notes],
         beside=_beside_table(evaluation),
         summary=table(SUMMARY, evaluation.summary),
         load=table(LOAD, evaluation.summary),
-        pictures=pictures,
+        joints=table(JOINTS, evaluation.summary),
+        lead=pictures[:1],
+        pictures=pictures[1:],
         learning=svg_uri(figures.draw_learning(histories)) if histories else "",
         trainings=table(_TRAINING, rows),
         differences=table(
@@ -214,7 +219,7 @@ def _beside_table(evaluation: Evaluation) -> Markup:
     """Return median error and spread, one line per command and one column per controller."""
     cells = {
         (row.command_m, row.controller): (
-            f"{millimetres(row.median_error_m, sign=True)} +- {millimetres(row.std_m)}"
+            f"{millimetres(row.median_error_m, sign=True)} ± {millimetres(row.std_m)}"
         )
         for row in evaluation.summary
     }
@@ -224,7 +229,7 @@ def _beside_table(evaluation: Evaluation) -> Markup:
 
     columns = [Column("command / m", lambda command: f"{command:.2f}")]
     columns += map(of, evaluation.controllers)
-    caption = "median of apex minus command, +- standard deviation of the hops, mm"
+    caption = "median of apex minus command ± standard deviation of the hops, mm"
     return table(columns, sorted({command for command, _ in cells}), caption)
 
 

@@ -12,78 +12,105 @@ from matplotlib.figure import Figure
 
 from hopping_leg import figure_style, hop_detection
 from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.colours import COMMAND, controller_colours
 from hopping_leg.evaluate.metrics import ESTIMATED_HEIGHT, START_SECONDS, SWITCH_SECONDS, stretches
 from hopping_leg.evaluate.result import Evaluation
-from hopping_leg.figure_style import COLOURS, COMMAND_COLOUR, WIDTH, colour, styled
+from hopping_leg.figure_style import WIDTH, styled
 from hopping_leg.trace import Trace
 
 _PHASE_SPACE_SECONDS = 10.0  # of the paper's trial
 _ESTIMATE_SECONDS = 3.0  # in which estimate and truth are drawn
+_TYPICAL = 99.0  # percentile up to which a scale reaches, where single ticks are far outside
 _ENOUGH = 5  # hops from which on a shape is drawn around the dots
 _COLUMNS = 4  # panels of robustness beside each other
 
 
 @styled
+def draw_apexes(traces: Mapping[str, Trace]) -> Figure:
+    """Draw all controllers' apexes over time in one panel, under the command that they share."""
+    figure, ((axes,),) = figure_style.panels(1, height=3.0)
+    for name, paint in controller_colours(traces).items():
+        hops, time = hop_detection.trace_hops(traces[name]), traces[name].column("time_s")
+        look: dict[str, Any] = {"markersize": 5, "linewidth": 0.5, "alpha": 0.85}
+        axes.plot(time[hops.tick], hops.apex, ".-", color=paint, label=name, **look)
+        command = traces[name].column("command_m")
+        axes.step(time, command, where="post", color=COMMAND, linewidth=1.6, zorder=1)
+    axes.plot([], [], color=COMMAND, linewidth=1.6, label="command")
+    axes.margins(x=0.01)
+    axes.set(xlabel="time / s", ylabel="apex height / m")
+    figure.legend(loc="outside upper right", ncols=min(len(traces) + 1, 4))
+    return figure
+
+
+@styled
 def draw_heights(traces: Mapping[str, Trace]) -> Figure:
-    """Draw base height, command and apexes over time, a panel per run under its title."""
+    """Draw base height, command and apexes over time, a panel per controller."""
     figure, axes = figure_style.panels(len(traces))
-    for index, (title, trace) in enumerate(traces.items()):
-        _draw_heights(axes[index][0], trace, colour(index), with_labels=index == 0)
-        axes[index][0].set_title(title)
-        axes[index][0].set_ylabel("base height / m")
+    for (panel,), (name, paint) in zip(axes, controller_colours(traces).items(), strict=True):
+        _draw_heights(panel, traces[name], paint)
+        panel.set_title(name)
+        panel.set_ylabel("base height / m")
     axes[-1][0].set_xlabel("time / s")
     figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside upper right", ncols=4)
     return figure
 
 
-def _draw_heights(axes: Axes, trace: Trace, paint: str, *, with_labels: bool) -> None:
+def _draw_heights(axes: Axes, trace: Trace, paint: str) -> None:
     time, command = trace.column("time_s"), trace.column("command_m")
     height, hops = trace.column("height_m"), hop_detection.trace_hops(trace)
-    names = ("base height", "command", "apex in flight", "median apex")
-    line, ask, dots, median = names if with_labels else ("_",) * 4
-    axes.plot(time, height, color=paint, linewidth=0.8, alpha=0.8, label=line)
-    axes.step(time, command, where="post", color=COMMAND_COLOUR, linewidth=1.4, label=ask)
-    axes.plot(time[hops.tick], hops.apex, ".", color="black", markersize=3.5, label=dots)
-    contrast = COLOURS[0] if paint == COLOURS[1] else COLOURS[1]
+    axes.plot(time, height, color=paint, linewidth=0.8, alpha=0.8, label="base height")
+    axes.step(time, command, where="post", color=COMMAND, linewidth=1.4, label="command")
+    axes.plot(time[hops.tick], hops.apex, ".", color=paint, markersize=6, label="apex in flight")
+    label = "median apex"
     for start, end in stretches(command):
         begin = time[start] + (SWITCH_SECONDS if start else START_SECONDS)
         apex = hops.apex[(hops.tick < end) & (time[hops.tick] >= begin)]
         if len(apex):
-            look: dict[str, Any] = {"color": contrast, "linewidth": 1.8, "zorder": 4}
-            axes.hlines(np.median(apex), begin, time[end - 1], label=median, **look)
-            median = "_"
+            look: dict[str, Any] = {"color": "black", "linewidth": 1.6, "zorder": 4}
+            axes.hlines(np.median(apex), begin, time[end - 1], label=label, **look)
+            label = "_"
     axes.margins(x=0.01)
 
 
 @styled
-def draw_phase_space(trace: Trace, title: str = "") -> Figure:
-    """Draw the torque the controller asked of the knee at every configuration it met.
+def draw_phase_space(traces: Mapping[str, Trace]) -> Figure:
+    """Draw the torque that controllers asked of the knee at every configuration they met.
 
-    Line: one example phase; circle: its start; diamond: its end. Of a run at a constant command
-    10 s after the start are drawn, or what there is of a shorter one.
+    A row per controller, all on the same axes and colours. Line: one example phase; circle: its
+    start; diamond: its end. Of a run at a constant command 10 s after the start are drawn, or what
+    there is of a shorter one.
     """
+    figure = Figure(figsize=(WIDTH, 3.0 * len(traces) + 0.4), layout="constrained")
+    panels = figure.subplots(len(traces), 2, sharex=True, sharey=True, squeeze=False)
+    shown = {name: _phase_space(trace) for name, trace in traces.items()}
+    torques = np.concatenate([np.abs(found["knee_command_nm"]) for found in shown.values()])
+    limit = float(np.nanpercentile(torques, _TYPICAL)) if np.isfinite(torques).any() else 0.0
+    limit = limit or 1.0
+    look: dict[str, Any] = {"cmap": figure_style.TORQUE_MAP, "vmin": -limit, "vmax": limit, "s": 9}
+    look |= {"edgecolors": "0.6", "linewidths": 0.2, "rasterized": True}
+    for row, (name, found) in zip(panels, shown.items(), strict=True):
+        angle, speed, torque, clearance = found.values()
+        flight = clearance >= hop_detection.FLIGHT_CLEARANCE
+        for axes, title, phase in ((row[0], "flight", flight), (row[1], "stance", ~flight)):
+            dots = axes.scatter(angle[phase], speed[phase], c=torque[phase], **look)
+            _draw_example_phase(axes, angle, speed, phase)
+            axes.set_title(f"{name}, {title}" if name else title)
+        row[0].set_ylabel("knee velocity / (rad/s)")
+    for axes in panels[-1]:
+        axes.set_xlabel("knee angle / rad")
+    panels[0][0].legend(loc="lower right")
+    figure.colorbar(dots, ax=panels, label="knee torque asked for / N m", extend="both", aspect=40)
+    return figure
+
+
+def _phase_space(trace: Trace) -> dict[str, Array]:
+    """Return what is drawn of a run: angle, velocity, torque, clearance of the foot."""
     time = trace.column("time_s")
     chosen = (time >= START_SECONDS) & (time < START_SECONDS + _PHASE_SPACE_SECONDS)
     if not chosen.any():
         chosen = time < _PHASE_SPACE_SECONDS
-    names = ("knee_position_rad", "knee_velocity_rad_s", "knee_command_nm")
-    angle, speed, torque = (trace.column(name)[chosen] for name in names)
-    flight = trace.column("foot_clearance_m")[chosen] >= hop_detection.FLIGHT_CLEARANCE
-    figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
-    panels = figure.subplots(1, 2, sharex=True, sharey=True)
-    limit = float(np.nanmax(np.abs(torque), initial=0.0)) or 1.0
-    look: dict[str, Any] = {"cmap": figure_style.TORQUE_MAP, "vmin": -limit, "vmax": limit, "s": 9}
-    look |= {"edgecolors": "0.6", "linewidths": 0.2, "rasterized": True}
-    for axes, name, phase in ((panels[0], "flight", flight), (panels[1], "stance", ~flight)):
-        dots = axes.scatter(angle[phase], speed[phase], c=torque[phase], **look)
-        _draw_example_phase(axes, angle, speed, phase)
-        axes.set_title(name)
-        axes.set_xlabel("knee angle / rad")
-    panels[0].set_ylabel("knee velocity / (rad/s)")
-    figure.colorbar(dots, ax=panels, label="knee torque asked for / N m")
-    if title:
-        figure.suptitle(title, x=0.01, ha="left", fontsize=10)
-    return figure
+    names = ("knee_position_rad", "knee_velocity_rad_s", "knee_command_nm", "foot_clearance_m")
+    return {name: trace.column(name)[chosen] for name in names}
 
 
 def _draw_example_phase(axes: Axes, angle: Array, speed: Array, phase: BoolArray) -> None:
@@ -97,32 +124,51 @@ def _draw_example_phase(axes: Axes, angle: Array, speed: Array, phase: BoolArray
     look: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyle": "none"}
     for tick, marker, label in ((start, "o", "start"), (end - 1, "D", "end")):
         axes.plot(angle[tick], speed[tick], marker=marker, markersize=7, label=label, **look)
-    axes.legend(loc="lower right")
 
 
 @styled
-def draw_estimate(trace: Trace, title: str = "") -> Figure:
-    """Draw estimated and true height over a few hops, and the error over the whole run."""
-    time, height, estimate = (trace.column(n) for n in ("time_s", "height_m", ESTIMATED_HEIGHT))
-    figure = Figure(figsize=(WIDTH, 3.2), layout="constrained")
-    over_time, spread = figure.subplots(1, 2, width_ratios=(2, 1))
-    shown = (time >= START_SECONDS) & (time < START_SECONDS + _ESTIMATE_SECONDS)
-    over_time.plot(time[shown], height[shown], color=COLOURS[0], label="true")
-    over_time.plot(time[shown], estimate[shown], "--", color=COLOURS[1], label="estimated")
-    over_time.set(xlabel="time / s", ylabel="base height / m")
-    over_time.margins(y=0.15)
-    over_time.legend(loc="upper right", ncols=2)
-    flight = trace.column("foot_clearance_m") >= hop_detection.FLIGHT_CLEARANCE
-    error = 1e3 * (estimate - height)
-    known = (time >= START_SECONDS) & np.isfinite(error)
-    bins = np.linspace(error[known].min() - 1, error[known].max() + 1, 50)
-    for name, phase, paint in (("flight", flight, COLOURS[0]), ("stance", ~flight, COLOURS[1])):
-        look: dict[str, Any] = {"histtype": "step", "density": True, "color": paint, "label": name}
-        spread.hist(error[known & phase], bins=bins, **look)
-    spread.set(xlabel="estimated - true / mm", ylabel="density / (1/mm)")
-    spread.legend()
-    over_time.set_title(title)
+def draw_estimate(traces: Mapping[str, Trace]) -> Figure:
+    """Draw estimated and true height over a few hops, and the error over the whole run.
+
+    A row per controller, on the same axes. An estimate jumps where its joint sample is late or the
+    leg changes its phase, so its ticks are dots without a line between them.
+    """
+    figure = Figure(figsize=(WIDTH, 2.7 * len(traces) + 0.4), layout="constrained")
+    panels = figure.subplots(len(traces), 2, width_ratios=(2, 1), sharex="col", squeeze=False)
+    found = {name: _estimate_errors(trace) for name, trace in traces.items()}
+    every = np.concatenate([error for error, _ in found.values()])
+    low, high = np.percentile(every, (100 - _TYPICAL, _TYPICAL)) if len(every) else (-1.0, 1.0)
+    bins = np.linspace(low - 1, high + 1, 50)
+    heights = np.concatenate([trace.column("height_m") for trace in traces.values()])
+    for (over_time, spread), (name, paint) in zip(
+        panels, controller_colours(traces).items(), strict=True
+    ):
+        time, height, estimate = (
+            traces[name].column(n) for n in ("time_s", "height_m", ESTIMATED_HEIGHT)
+        )
+        shown = (time >= START_SECONDS) & (time < START_SECONDS + _ESTIMATE_SECONDS)
+        over_time.plot(time[shown], height[shown], color="black", linewidth=1, label="true")
+        over_time.plot(time[shown], estimate[shown], ".", color=paint, ms=3, label="estimated")
+        over_time.set(ylabel="base height / m", title=name)
+        over_time.set_ylim(heights.min() - 0.02, heights.max() + 0.06)
+        over_time.legend(loc="upper right", ncols=2)
+        error, flight = found[name]
+        for label, phase, line in (("flight", flight, "-"), ("stance", ~flight, ":")):
+            look: dict[str, Any] = {"histtype": "step", "density": True, "linestyle": line}
+            spread.hist(error[phase], bins=bins, color=paint, label=label, **look)
+        spread.set_ylabel("density / (1/mm)")
+        spread.legend()
+    panels[-1][0].set_xlabel("time / s")
+    panels[-1][1].set_xlabel("estimated - true / mm")
     return figure
+
+
+def _estimate_errors(trace: Trace) -> tuple[Array, BoolArray]:
+    """Return estimated minus true height, mm, where it is known, and whether that is in flight."""
+    error = 1e3 * (trace.column(ESTIMATED_HEIGHT) - trace.column("height_m"))
+    known = (trace.column("time_s") >= START_SECONDS) & np.isfinite(error)
+    flight = trace.column("foot_clearance_m") >= hop_detection.FLIGHT_CLEARANCE
+    return error[known], flight[known]
 
 
 @styled
@@ -138,15 +184,15 @@ def draw_distributions(evaluation: Evaluation) -> Figure:
     slot = 0.8 / len(controllers)
     rng = np.random.default_rng(0)
     for place, command in enumerate(commands):
-        axes.hlines(command, place - 0.45, place + 0.45, color=COMMAND_COLOUR, linewidth=1.2)
-    for index, controller in enumerate(controllers):
+        axes.hlines(command, place - 0.45, place + 0.45, color=COMMAND, linewidth=1.2)
+    for index, (controller, paint) in enumerate(controller_colours(controllers).items()):
         for place, command in enumerate(commands):
             apex = apexes.get((controller, command), np.empty(0))
             if len(apex):
                 centre = place - 0.4 + slot * (index + 0.5)
-                _draw_apexes(axes, apex, centre, slot, colour(index), rng)
-        axes.plot([], [], color=colour(index), linewidth=3, label=controller)
-    axes.plot([], [], color=COMMAND_COLOUR, linewidth=1.2, label="command")
+                _draw_distribution(axes, apex, centre, slot, paint, rng)
+        axes.plot([], [], color=paint, linewidth=3, label=controller)
+    axes.plot([], [], color=COMMAND, linewidth=1.2, label="command")
     axes.set_xticks(range(len(commands)), [f"{c:.2f}" for c in commands])
     axes.grid(visible=False, axis="x")
     axes.set(xlabel="commanded apex height / m", ylabel="apex height / m")
@@ -154,7 +200,7 @@ def draw_distributions(evaluation: Evaluation) -> Figure:
     return figure
 
 
-def _draw_apexes(
+def _draw_distribution(
     axes: Axes, apex: Array, centre: float, slot: float, paint: str, rng: np.random.Generator
 ) -> None:
     if len(apex) >= _ENOUGH and np.ptp(apex) > 0:
@@ -175,12 +221,12 @@ def draw_ladder(evaluation: Evaluation) -> Figure:
     apex, error = figure.subplots(1, 2)
     controllers = list(dict.fromkeys(row.controller for row in evaluation.ladder))
     commands = sorted({row.command_m for row in evaluation.ladder})
-    apex.plot(commands, commands, color=COMMAND_COLOUR, linewidth=1.2, label="command")
-    error.axhline(0, color=COMMAND_COLOUR, linewidth=1.2)
-    for index, name in enumerate(controllers):
+    apex.plot(commands, commands, color=COMMAND, linewidth=1.2, label="command")
+    error.axhline(0, color=COMMAND, linewidth=1.2)
+    for index, (name, paint) in enumerate(controller_colours(controllers).items()):
         rows = [row for row in evaluation.ladder if row.controller == name]
         at, median, spread = np.array([(r.command_m, r.median_error_m, r.std_m) for r in rows]).T
-        look = {"color": colour(index), "marker": "o", "markersize": 3.5, "linewidth": 1.2}
+        look: dict[str, Any] = {"color": paint, "marker": "o", "markersize": 3.5, "linewidth": 1.2}
         apex.plot(at, at + median, label=name, **look)
         aside = at + 0.0012 * (index - (len(controllers) - 1) / 2)
         error.errorbar(aside, 1e3 * median, 1e3 * spread, capsize=2, elinewidth=0.9, **look)
@@ -197,20 +243,20 @@ def draw_ladder(evaluation: Evaluation) -> Figure:
 def draw_robustness(result: dict[str, Any]) -> Figure:
     """Draw the share of successful trials of a benchmark's JSON over the level, a panel an axis."""
     axes, levels = result["axes"], result["levels"]
-    controllers = list(dict.fromkeys(row["controller"] for row in levels))
+    colours = controller_colours(row["controller"] for row in levels)
     rows, columns = math.ceil(len(axes) / _COLUMNS), min(_COLUMNS, len(axes))
     figure = Figure(figsize=(WIDTH, 1.7 * rows + 0.6), layout="constrained")
     panels = figure.subplots(rows, columns, sharey=True, squeeze=False)
     for panel, axis in zip(panels.flat, axes, strict=False):
-        for index, controller in enumerate(controllers):
+        for controller, paint in colours.items():
             points = [  # the curve passes through the neutral level, where nothing is changed
                 (axis["neutral"] if row["axis"] == "nominal" else row["level"], row["success"])
                 for row in levels
                 if row["controller"] == controller and row["axis"] in (axis["name"], "nominal")
             ]
             at, shares = np.array(sorted(points)).T
-            look = {"color": colour(index), "marker": "o", "markersize": 3, "linewidth": 1.2}
-            panel.plot(at, 100 * shares, label=controller, **look)
+            look: dict[str, Any] = {"color": paint, "marker": "o", "markersize": 3}
+            panel.plot(at, 100 * shares, linewidth=1.2, label=controller, **look)
         panel.set_ylim(-5, 105)
         panel.set_title(axis["name"], fontsize=9)
         panel.set_xlabel("level" if axis["unit"] == "1" else f"level / {axis['unit']}")
@@ -219,7 +265,7 @@ def draw_robustness(result: dict[str, Any]) -> Figure:
     for line in panels:
         line[0].set_ylabel("successful / %")
     handles, labels = panels.flat[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=min(len(controllers), 4))
+    figure.legend(handles, labels, loc="outside upper right", ncols=min(len(colours), 4))
     return figure
 
 
@@ -230,15 +276,15 @@ def draw_learning(histories: Mapping[str, Sequence[Mapping[str, Any]]]) -> Figur
     panels = figure.subplots(1, 2, sharey=True)
     shown = (("steps", 1e-6, "experience / million steps"), ("minutes", 1.0, "time / min"))
     for axes, (key, factor, label) in zip(panels, shown, strict=True):
-        for index, (name, rows) in enumerate(histories.items()):
-            if not rows:
+        for name, paint in controller_colours(histories).items():
+            if not (rows := histories[name]):
                 continue
             at, score = np.array([(factor * row[key], 1e3 * row["score_m"]) for row in rows]).T
             best = int(np.argmin(score))
-            axes.plot(at, score, color=colour(index), linewidth=1.2, label=name)
-            axes.plot(at[best], score[best], "o", color=colour(index), markersize=5)
+            axes.plot(at, score, color=paint, linewidth=1.2, label=name)
+            axes.plot(at[best], score[best], "o", color=paint, markersize=5)
         axes.set_xlabel(label)
-        axes.set_yscale("log")
+        figure_style.plain_log(axes, "y")
     panels[0].set_ylabel("score of the snapshot / mm")
     panels[0].legend()
     return figure

@@ -1,7 +1,7 @@
 """The report: figures of an evaluation, and one HTML page that holds all and needs nothing."""
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -9,10 +9,13 @@ from typing import Any
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from hopping_leg.colours import controller_colours
 from hopping_leg.evaluate import acceptance, figures, metrics, result, runner, tables, trials
-from hopping_leg.evaluate.video import Video, fixed_traces, render_video
+from hopping_leg.evaluate.verdict import verdict
+from hopping_leg.evaluate.video import Video, fixed_traces, render_hops
 from hopping_leg.html_page import data_uri, page_template, svg_uri, table
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.trace import Trace
 
 
 @dataclass(frozen=True)
@@ -28,26 +31,23 @@ class Picture:
     """Names of the traces it is drawn from."""
 
 
-_HEIGHTS = {
-    "sequence": (
-        "All commands in turn",
-        "Base height in the trial that commands each height for 5 s, as in the paper's Fig. 8."
-        " Dots: apexes with the foot off the ground; thick lines: their median where they count.",
-    ),
-    "staircase": (
-        "Staircase",
-        "Base height while the command rises by 0.02 m (for this leg's size) every 5 s, as in the"
-        " paper's Fig. 5.",
-    ),
-    "heights": (
-        "Heights over time",
-        "Base height over time. Dots: apexes with the foot off the ground.",
-    ),
+_KINDS = ("staircase", "sequence")
+_TITLES = {
+    "staircase": "Staircase",
+    "sequence": "All commands in turn",
+    "heights": "Heights over time",
+}
+_CAPTIONS = {
+    "staircase": "Base height while the command rises by 0.02 m (for this leg's size) every 5 s, as"
+    " in the paper's Fig. 5.",
+    "sequence": "Base height in the trial that commands each height for 5 s, as in the paper's"
+    " Fig. 8.",
+    "heights": "Base height over time.",
 }
 
 
 def draw_report_figures(evaluation: result.Evaluation, runs: Sequence[trials.Run]) -> list[Picture]:
-    """Draw every figure that the runs allow."""
+    """Draw every figure that the runs allow; the first says most."""
     return list(_figures(evaluation, runs))
 
 
@@ -55,15 +55,21 @@ def _figures(evaluation: result.Evaluation, runs: Sequence[trials.Run]) -> Itera
     def files(*kinds: str) -> tuple[str, ...]:
         return tuple(run.file_name for run in runs if run.trial.kind in kinds)
 
+    order = evaluation.controllers
+    runs = sorted(
+        runs, key=lambda run: order.index(run.controller) if run.controller in order else 0
+    )
     examples = _examples(runs)
-    shown = {
-        kind: _first_of_each(run for run in runs if run.trial.kind == kind)
-        for kind in ("sequence", "staircase")
-    }
-    for kind, found in shown.items() if any(shown.values()) else [("heights", examples)]:
-        if found:
-            figure = figures.draw_heights({run.controller: run.trace for run in found})
-            yield Picture(kind, *_HEIGHTS[kind], figure, tuple(run.file_name for run in found))
+    shown = {kind: _first_of_each(run for run in runs if run.trial.kind == kind) for kind in _KINDS}
+    shown = {kind: found for kind, found in shown.items() if found}
+    for kind, found in list(shown.items())[:1]:
+        yield _picture(
+            "apexes",
+            f"Apexes, {_TITLES[kind].lower()}",
+            "Apexes with the foot off the ground, first seed. The command is what they aim at.",
+            figures.draw_apexes,
+            found,
+        )
     if any(row.hops for row in evaluation.summary):
         yield Picture(
             "distributions",
@@ -77,25 +83,36 @@ def _figures(evaluation: result.Evaluation, runs: Sequence[trials.Run]) -> Itera
         caption = "Commands between and beyond the trained ones, 15 s each."
         figure = figures.draw_ladder(evaluation)
         yield Picture("ladder", "Ladder of commands", caption, figure, files("ladder"))
-    for run in examples:
-        about = f"{run.controller}, command {run.trial.steps[0][0]:.2f} m"
-        safe = run.file_name.removesuffix(".parquet")
-        yield Picture(
-            f"phase-space-{safe}",
-            f"Knee torque in phase space: {run.controller}",
-            "Torque asked of the knee at every configuration met in 10 s, as in the paper's Fig. 6."
-            " Line: one phase from its start (circle) to its end (diamond).",
-            figures.draw_phase_space(run.trace, about),
-            (run.file_name,),
+    for kind, found in shown.items() or [("heights", examples)]:
+        if found:
+            caption = f"{_CAPTIONS[kind]} Dots: apexes in flight; black: their median."
+            yield _picture(kind, _TITLES[kind], caption, figures.draw_heights, found)
+    if examples:
+        command = f"Command {examples[0].trial.steps[0][0]:.2f} m."
+        yield _picture(
+            "phase-space",
+            "Knee torque in phase space",
+            f"{command} Torque asked of the knee at every configuration met in 10 s, as in the"
+            " paper's Fig. 6. Line: one phase from its start (circle) to its end (diamond).",
+            figures.draw_phase_space,
+            examples,
         )
-        if metrics.has_estimate(run.trace):
-            yield Picture(
-                f"estimate-{safe}",
-                f"Estimated height: {run.controller}",
-                "Height as the controller estimates it from its joints, beside the true height.",
-                figures.draw_estimate(run.trace, about),
-                (run.file_name,),
-            )
+    if estimated := [run for run in examples if metrics.has_estimate(run.trace)]:
+        caption = (
+            f"{command} Height as controllers estimate it from their joints, and the true one."
+        )
+        yield _picture("estimate", "Estimated height", caption, figures.draw_estimate, estimated)
+
+
+def _picture(
+    name: str,
+    title: str,
+    caption: str,
+    draw: Callable[[dict[str, Trace]], Figure],
+    runs: Sequence[trials.Run],
+) -> Picture:
+    figure = draw({run.controller: run.trace for run in runs})
+    return Picture(name, title, caption, figure, tuple(run.file_name for run in runs))
 
 
 def _examples(runs: Sequence[trials.Run]) -> list[trials.Run]:
@@ -123,19 +140,24 @@ def _first_of_each(runs: Iterable[trials.Run]) -> list[trials.Run]:
 def write_report(judged: runner.EvaluationRun, videos: dict[str, Video] | None = None) -> bytes:
     """Return the report as HTML, with the video of each controller if there are some."""
     evaluation, secondary = judged.evaluation, judged.evaluation.secondary
+    shown = pictures_of(evaluation, judged.runs)
     page = page_template("hopping_leg.evaluate", "report.html.j2").render(
         title=f"Hopping leg: {', '.join(evaluation.controllers)}",
         subtitle=_subtitle(evaluation.conditions),
         evaluation=evaluation,
+        verdicts=verdicts(evaluation),
         tables={
             "summary": table(tables.SUMMARY, evaluation.summary),
             "load": table(tables.LOAD, evaluation.summary),
+            "joints": table(tables.JOINTS, evaluation.summary),
             "groups": table(tables.GROUPS, evaluation.groups),
             "secondary": table(tables.SUMMARY, secondary.summary if secondary else []),
             "estimators": tables.estimator_table(evaluation.estimators),
         },
         acceptance=acceptance.acceptance_lines(map(asdict, evaluation.summary)),
-        pictures=pictures_of(evaluation, judged.runs),
+        lead=shown[:1],
+        pictures=shown[1:],
+        sinks=_sinks(evaluation),
         videos=[
             {
                 "controller": name,
@@ -149,20 +171,40 @@ def write_report(judged: runner.EvaluationRun, videos: dict[str, Video] | None =
     return page.encode()
 
 
+def verdicts(evaluation: result.Evaluation) -> list[dict[str, str]]:
+    """Return what a page says first: each controller, its colour and the verdict on it."""
+    return [
+        {"controller": name, "colour": paint, "text": verdict(evaluation, name)}
+        for name, paint in controller_colours(evaluation.controllers).items()
+    ]
+
+
+def _sinks(evaluation: result.Evaluation) -> str:
+    """Return how deep feet sink into the ground, as each controller's deepest."""
+    deepest = {
+        name: max(row.max_sink_m for row in evaluation.rows(name))
+        for name in evaluation.controllers
+    }
+    return ", ".join(f"{1e3 * sink:.0f} mm ({name})" for name, sink in deepest.items())
+
+
 def render_videos(judged: runner.EvaluationRun, robot: Robot) -> dict[str, Video]:
     """Render one video per controller; after a first failure the rest are not tried."""
-    names = judged.evaluation.controllers
-    videos = dict.fromkeys(names, Video(None, "it was not asked for"))
-    hopped = {name: traces for name in names if (traces := fixed_traces(judged.runs, name))}
+    colours = controller_colours(judged.evaluation.controllers)
+    videos = dict.fromkeys(colours, Video(None, "it was not asked for"))
+    hopped = {name: traces for name in colours if (traces := fixed_traces(judged.runs, name))}
+
+    def render(name: str) -> Video:
+        return render_hops(robot, name, colours[name], hopped[name])
+
     if not hopped:
         return videos
-    (first, traces), *others = hopped.items()
-    videos[first] = render_video(robot, traces)
+    first, *others = hopped
+    videos[first] = render(first)
     if videos[first].content is None:
         return videos | dict.fromkeys(hopped, videos[first])
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        rendered = pool.map(lambda one: render_video(robot, one[1]), others)
-        return videos | dict(zip([name for name, _ in others], rendered, strict=True))
+        return videos | dict(zip(others, pool.map(render, others), strict=True))
 
 
 def _subtitle(c: dict[str, Any]) -> str:

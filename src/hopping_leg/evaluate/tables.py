@@ -20,7 +20,7 @@ from hopping_leg.terminal import print_table
 
 def millimetres(value: float, sign: bool = False) -> str:
     """Return a length in mm; a dash where there is none."""
-    return f"{1e3 * value:{'+' if sign else ''}.1f}" if value == value else "-"
+    return f"{1e3 * value:{'+' if sign else ''}z.1f}" if value == value else "-"
 
 
 def column(
@@ -51,7 +51,7 @@ def _percent(heading: str, name: str) -> Column:
 
 def _interval(row: Summary | Group) -> str:
     low = millimetres(row.median_error_low_m, sign=True)
-    return f"{low} .. {millimetres(row.median_error_high_m, sign=True)}"
+    return f"{low} to {millimetres(row.median_error_high_m, sign=True)}"
 
 
 def _positive(value: float | None) -> bool:
@@ -61,8 +61,8 @@ def _positive(value: float | None) -> bool:
 _CONTROLLER = column("controller", "controller")
 _FLOOR = column("floor", "floor")
 _COMMAND = column("command / m", "command_m", ".2f")
-_ERROR = column("median error / mm", "median_error_m", "+.1f", 1e3)
-_INTERVAL = Column("95 % interval", _interval)
+_ERROR = column("median error / mm", "median_error_m", "+z.1f", 1e3)
+_INTERVAL = Column("95 % interval / mm", _interval)
 _STD = column("std / mm", "std_m", ".1f", 1e3)
 _HOPS = column("hops", "hops")
 _SKIPPED = column("skipped", "skipped_hops", bad=_positive)
@@ -77,36 +77,39 @@ SUMMARY = (
     column("IQR / mm", "iqr_m", ".1f", 1e3),
     _HOPS,
     _SKIPPED,
-    column("hops/s", "hop_rate_hz", ".2f"),
-    _percent("flight", "flight_fraction"),
-    column("lowest base / mm", "min_base_height_m", ".0f", 1e3),
+    column("hops / s", "hop_rate_hz", ".2f"),
+    column("flight / %", "flight_fraction", ".0f", 100),
     column("sink / mm", "max_sink_m", ".0f", 1e3),
+    column("lowest base / mm", "min_base_height_m", ".0f", 1e3),
     _CONTACTS,
-    Column(
-        "peak torque hip, knee / N m",
-        lambda r: f"{r.peak_hip_torque_nm:.1f}, {r.peak_knee_torque_nm:.1f}",
-    ),
-    _percent("outside limits", "outside_limits_fraction"),
-    _percent("limits' share of torque", "soft_limit_share"),
 )
 
 LOAD = (
     _CONTROLLER,
     _COMMAND,
+    column("peak hip / N m", "peak_hip_torque_nm", ".1f"),
+    column("peak knee / N m", "peak_knee_torque_nm", ".1f"),
     column("RMS hip / N m", "rms_hip_torque_nm", ".1f"),
     column("RMS knee / N m", "rms_knee_torque_nm", ".1f"),
-    column("RMS / rated", "rated_torque_share", ".0f", 100, " %", bad=lambda share: share > 1),
+    column("RMS of rated / %", "rated_torque_share", ".0f", 100, bad=lambda share: share > 1),
     Column(
-        "min until limited",
+        "limited after / min",
         lambda r: f"{r.thermal_minutes:.1f}" if math.isfinite(r.thermal_minutes) else "-",
     ),
     column("mechanical / W", "mean_power_w", ".1f"),
     column("electrical / W", "mean_electrical_power_w", ".1f"),
-    column("peak regeneration / W", "peak_regeneration_w", ".0f"),
-    column("bus rise / V", "bus_voltage_rise_v", ".2f"),
-    column("peak knee speed / (rad/s)", "peak_knee_speed_rad_s", ".1f"),
-    column("reversals / Hz", "torque_reversals_hz", ".1f"),
+    column("peak braking / W", "peak_regeneration_w", ".0f"),
+    column("bus rise / V", "bus_voltage_rise_v", ".1f"),
+)
+
+JOINTS = (
+    _CONTROLLER,
+    _COMMAND,
+    column("knee speed / (rad/s)", "peak_knee_speed_rad_s", ".1f"),
+    column("torque reversals / Hz", "torque_reversals_hz", ".1f"),
+    column("outside soft limits / %", "outside_limits_fraction", ".1f", 100),
     column("soft limits, RMS / N m", "soft_limit_rms_nm", ".2f"),
+    column("soft limits' share of torque / %", "soft_limit_share", ".1f", 100),
     column("stop contacts", "stop_contacts", bad=_positive),
 )
 
@@ -128,7 +131,7 @@ GROUPS = (
 _SHORT = (
     _CONTROLLER,
     column("cmd", "command_m", ".0f", 1e3),
-    column("error", "median_error_m", "+.1f", 1e3),
+    column("error", "median_error_m", "+z.1f", 1e3),
     column("std", "std_m", ".1f", 1e3),
     _HOPS,
     column("skip", "skipped_hops"),
@@ -146,7 +149,7 @@ _COUNTED = (
     column("asked", "asked"),
     _percent("exact", "exact"),
     _percent("at rest", "at_rest"),
-    column("error / mm", "median_error_m", "+.1f", 1e3),
+    column("error / mm", "median_error_m", "+z.1f", 1e3),
     column("landing / weights", "landing_force", ".1f"),
 )
 
@@ -154,8 +157,8 @@ _CLIMBS = (
     _CONTROLLER,
     _FLOOR,
     _COMMAND,
-    column("first hop / mm", "worst_first_error_m", "+.1f", 1e3),
-    column("later / mm", "worst_error_m", "+.1f", 1e3),
+    column("first hop / mm", "worst_first_error_m", "+z.1f", 1e3),
+    column("later / mm", "worst_error_m", "+z.1f", 1e3),
     _SKIPPED,
 )
 
@@ -182,7 +185,7 @@ def neighbour_table(comparisons: Sequence[Comparison]) -> Markup:
             lambda r: not r["p"] < 1e-3,
         ),
         column("Cliff's delta", "cliffs_delta", "+.3f"),
-        Column("95 % interval", lambda r: f"{low.text(r)} .. {high.text(r)}"),
+        Column("95 % interval", lambda r: f"{low.text(r)} to {high.text(r)}"),
         column("hops in the overlap", "overlap", ".1f", 100, " %"),
     )
     return table(
@@ -219,9 +222,9 @@ def estimator_table(estimators: Sequence[Estimator]) -> Markup:
     """Return bias and spread of estimated minus true height."""
 
     def pair(heading: str, name: str) -> Column:
-        bias = column("", f"{name}_bias_m", "+.1f", 1e3)
+        bias = column("", f"{name}_bias_m", "+z.1f", 1e3)
         std = column("", f"{name}_std_m", ".1f", 1e3)
-        return Column(heading, lambda row: f"{bias.text(row)} +- {std.text(row)}")
+        return Column(heading, lambda row: f"{bias.text(row)} ± {std.text(row)}")
 
     columns = (
         _CONTROLLER,
@@ -230,7 +233,7 @@ def estimator_table(estimators: Sequence[Estimator]) -> Markup:
         pair("apex, after landing / mm", "apex"),
         _HOPS,
     )
-    return table(columns, estimators, "estimated minus true, mean +- standard deviation")
+    return table(columns, estimators, "estimated minus true, mean ± standard deviation")
 
 
 def print_evaluation(console: Console, evaluation: Evaluation) -> None:

@@ -1,24 +1,25 @@
-"""A short video of a hop at every command, rendered off screen in a process of its own.
+"""Short videos of hops side by side, rendered off screen in a process of its own.
 
 OpenGL drivers crash, hang or are missing; none of that may take an evaluation down. That process is
-``python -m hopping_leg.evaluate.video XML NPY OUT M...``, as MuJoCo chooses the OpenGL backend when
+``python -m hopping_leg.evaluate.video XML CLIPS OUT``, as MuJoCo chooses the OpenGL backend when
 it is imported.
 """
 
+import json
 import os
 import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import mujoco
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageFont
 
-from hopping_leg.arrays import Array
+from hopping_leg.colours import COMMAND, rgb
 from hopping_leg.evaluate import metrics, trials
 from hopping_leg.hop_detection import trace_hops
 from hopping_leg.robot import Robot, get_spec
@@ -30,13 +31,25 @@ BACKENDS = ("egl", "osmesa")
 CLIP_SECONDS = 1.2
 FRAME_RATE = 33.3  # frames per second of simulated time
 SLOWDOWN = 2.0
-SIZE = (220, 300)  # width and height of one command's picture, pixels
-TIMEOUT = 120.0  # given to one backend, s
+SIZE = (380, 400)  # width and height of one leg's picture, pixels
+TIMEOUT = 240.0  # given to one backend, s
 _ENCODING: dict[str, dict[str, Any]] = {
     ".webp": {"quality": 60, "method": 4},
     ".gif": {"optimize": True},
 }
 """By the file's ending."""
+
+
+@dataclass(frozen=True)
+class Clip:
+    """What one picture of a video shows."""
+
+    name: str
+    """Who hops."""
+    colour: str
+    """Of the motors and the name, ``#rrggbb``."""
+    poses: list[list[float]]
+    """Height, hip and knee, m and rad, and the commanded height, m, of each frame."""
 
 
 @dataclass(frozen=True)
@@ -56,44 +69,66 @@ def fixed_traces(runs: Sequence[trials.Run], controller: str) -> dict[float, Tra
     }
 
 
-def render_video(robot: Robot, traces: Mapping[float, Trace], kind: Animation = "webp") -> Video:
-    """Render a hop at every command side by side, at half speed, given a run at each, m."""
-    commands = list(traces)
-    poses = np.stack([clip(trace) for trace in traces.values()])
+def render_hops(
+    robot: Robot, who: str, colour: str, traces: Mapping[float, Trace], kind: Animation = "webp"
+) -> Video:
+    """Render a controller's hop at every command side by side, at half speed, given a run at each.
+
+    The controller has a name and a colour.
+    """
+    clips = [
+        Clip(who, colour, sample(trace, _first_apex(trace), CLIP_SECONDS))
+        for trace in traces.values()
+    ]
+    return render_clips(robot, clips, 1000 * SLOWDOWN / FRAME_RATE, kind)
+
+
+def sample(
+    trace: Trace, start: float, seconds: float, rate: float = FRAME_RATE
+) -> list[list[float]]:
+    """Return the poses of a ``Clip`` at some frames per second from a time of a run on, s."""
+    time = trace.column("time_s")
+    moments = start + np.arange(round(seconds * rate)) / rate
+    names = ("height_m", "hip_position_rad", "knee_position_rad")
+    pose = [np.interp(moments, time, trace.column(name)) for name in names]
+    now = np.clip(np.searchsorted(time, moments + 1e-9, side="right") - 1, 0, None)
+    rows: list[list[float]] = np.stack([*pose, trace.column("command_m")[now]], axis=1).tolist()
+    return rows
+
+
+def _first_apex(trace: Trace) -> float:
+    """Return when the first apex after the start is, s."""
+    time = trace.column("time_s")
+    apexes = time[trace_hops(trace).tick]
+    settled = apexes[apexes >= metrics.START_SECONDS]
+    return float(settled[0] if len(settled) else min(metrics.START_SECONDS, time[-1]))
+
+
+def render_clips(
+    robot: Robot, clips: Sequence[Clip], milliseconds: float, kind: Animation = "webp"
+) -> Video:
+    """Render clips of the same length side by side, each frame shown so long."""
     with tempfile.TemporaryDirectory() as folder:
-        model, motion, out = (Path(folder) / n for n in ("leg.xml", "poses.npy", f"hops.{kind}"))
+        model, motion, out = (Path(folder) / n for n in ("leg.xml", "clips", f"hops.{kind}"))
         spec = get_spec(robot)
         spec.compile()
         model.write_text(spec.to_xml(), encoding="utf-8")
-        np.save(motion, poses)
+        content = {"milliseconds": milliseconds, "clips": [asdict(clip) for clip in clips]}
+        motion.write_text(json.dumps(content), encoding="utf-8")
         reasons = []
         chosen = os.environ.get("MUJOCO_GL", "").lower()
         for backend in (chosen,) if chosen else BACKENDS:
-            reason = _render(backend, model, motion, out, commands)
+            reason = _render(backend, model, motion, out)
             if reason is None:
                 return Video(out.read_bytes())
             reasons.append(f"{backend}: {reason}")
     return Video(None, f"{'; '.join(reasons)} (Mesa's libegl1 or libosmesa6 would do)")
 
 
-def clip(trace: Trace) -> Array:
-    """Return height, hip and knee, m and rad, (frames, 3), from the first apex after the start."""
-    time = trace.column("time_s")
-    names = ("height_m", "hip_position_rad", "knee_position_rad")
-    pose = np.stack([trace.column(name) for name in names], axis=1)
-    hops = trace_hops(trace)
-    settled = time[hops.tick][time[hops.tick] >= metrics.START_SECONDS]
-    start = settled[0] if len(settled) else min(metrics.START_SECONDS, time[-1])
-    moments = start + np.arange(round(CLIP_SECONDS * FRAME_RATE)) / FRAME_RATE
-    return np.stack([np.interp(moments, time, column) for column in pose.T], axis=1)
-
-
-def _render(
-    backend: str, model: Path, motion: Path, out: Path, commands: list[float]
-) -> str | None:
+def _render(backend: str, model: Path, motion: Path, out: Path) -> str | None:
     """Render in another process; return what went wrong or None."""
     command = [sys.executable, "-m", "hopping_leg.evaluate.video"]
-    command += [str(model), str(motion), str(out), *(f"{c:.6f}" for c in commands)]
+    command += [str(model), str(motion), str(out)]
     environment = {**os.environ, "MUJOCO_GL": backend}
     if backend == "osmesa":
         environment["PYOPENGL_PLATFORM"] = "osmesa"
@@ -109,45 +144,49 @@ def _render(
     return lines[-1] if lines else f"the renderer ended with code {done.returncode}"
 
 
-def _main(arguments: list[str]) -> None:
-    """Render poses to a file; arguments as in the module's docstring."""
-    model = mujoco.MjModel.from_xml_path(arguments[0])
-    poses = np.load(arguments[1], allow_pickle=False)
-    frames = _draw_frames(model, poses, [float(text) for text in arguments[3:]])
-    out = Path(arguments[2])
+def _main(xml: str, motion: str, out: str) -> None:
+    """Render clips to a file; arguments as in the module's docstring."""
+    content = json.loads(Path(motion).read_text(encoding="utf-8"))
+    clips = [Clip(**clip) for clip in content["clips"]]
+    frames = _draw_frames(mujoco.MjModel.from_xml_path(xml), clips)
     frames[0].save(
         out,
         save_all=True,
         append_images=frames[1:],
-        duration=round(1000 * SLOWDOWN / FRAME_RATE),
+        duration=round(content["milliseconds"]),
         loop=0,
-        **_ENCODING[out.suffix],
+        **_ENCODING[Path(out).suffix],
     )
 
 
-def _draw_frames(model: mujoco.MjModel, poses: Array, commands: list[float]) -> list[Image.Image]:
-    """Return one picture per frame with all commands side by side; poses (commands, frames, 3)."""
-    data = mujoco.MjData(model)
-    highest = float(poses[..., 0].max())
+def _draw_frames(model: mujoco.MjModel, clips: Sequence[Clip]) -> list[Image.Image]:
+    """Return one picture per frame with all clips side by side."""
+    data, poses = mujoco.MjData(model), np.array([clip.poses for clip in clips])
+    housing = model.material("housing").rgba
+    highest = float(poses[..., [0, 3]].max())
     camera = mujoco.MjvCamera()
-    camera.lookat[:] = [0.02, 0.0, 0.5 * highest]
+    camera.lookat[:] = [0.02, 0.0, 0.48 * highest]
     camera.azimuth, camera.elevation = 90.0, -4.0
     camera.distance = 0.35 + 1.25 * highest
     width, height = SIZE
+    font = ImageFont.load_default(16)
     pictures = []
     with mujoco.Renderer(model, height, width) as renderer:
         renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
         for frame in range(poses.shape[1]):
-            picture = Image.new("RGB", (width * len(commands), height))
+            picture = Image.new("RGB", (width * len(clips), height))
             draw = ImageDraw.Draw(picture)
-            for column, command in enumerate(commands):
-                data.qpos[:] = poses[column, frame]
+            for column, clip in enumerate(clips):
+                *data.qpos[:], command = poses[column, frame]
+                housing[:3] = np.array(rgb(clip.colour)) / 255
                 mujoco.mj_forward(model, data)
                 renderer.update_scene(data, camera)
                 _mark(renderer.scene, command)
                 picture.paste(Image.fromarray(renderer.render()), (column * width, 0))
-                text = f"command {command:.2f} m   hip axis {poses[column, frame, 0]:.2f} m"
-                draw.text((column * width + 8, 6), text, fill=(40, 40, 40))
+                at = column * width + 12
+                draw.text((at, 8), clip.name, clip.colour, font, stroke_width=0.4)
+                text = f"command {command:.2f} m    hip axis {data.qpos[0]:.2f} m"
+                draw.text((at, 30), text, (40, 40, 40), font)
             pictures.append(picture)
     return pictures
 
@@ -157,13 +196,13 @@ def _mark(scene: mujoco.MjvScene, command: float) -> None:
     mujoco.mjv_initGeom(
         scene.geoms[scene.ngeom],
         mujoco.mjtGeom.mjGEOM_BOX,
-        np.array([0.25, 0.001, 0.0012]),
+        np.array([0.25, 0.001, 0.0015]),
         np.array([0.0, 0.06, command]),
         np.eye(3).ravel(),
-        np.array([0.84, 0.37, 0.0, 0.8], dtype=np.float32),
+        np.array([*(part / 255 for part in rgb(COMMAND)), 1.0], dtype=np.float32),
     )
     scene.ngeom += 1
 
 
 if __name__ == "__main__":
-    _main(sys.argv[1:])
+    _main(*sys.argv[1:])

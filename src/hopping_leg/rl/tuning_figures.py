@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from hopping_leg.figure_style import COLOURS, WIDTH, styled
+from hopping_leg.colours import COLOURS
+from hopping_leg.figure_style import WIDTH, styled
 
 _COLUMNS = 3
 
