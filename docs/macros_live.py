@@ -13,7 +13,7 @@ from typing import Any, get_type_hints
 
 import jinja2
 
-from hopping_leg.controllers import registry
+from hopping_leg.controllers import registry, robot_numbers
 from hopping_leg.controllers.energy_shaping.gains import (
     FORCES,
     POWERS_OF_SIZE,
@@ -21,7 +21,8 @@ from hopping_leg.controllers.energy_shaping.gains import (
     own_gains,
 )
 from hopping_leg.controllers.mpc import HopShape
-from hopping_leg.controllers.observation_history import OBSERVATION_HISTORIES, Dated
+from hopping_leg.controllers.observation_history import OBSERVATION_HISTORIES, AnyLeg, Dated
+from hopping_leg.controllers.policy import HEIGHT
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.figure_style import COLOURS
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
@@ -49,7 +50,9 @@ from hopping_leg.viewer.live_leg import PUSH_SECONDS
 
 FOLDER = Path(__file__).parent / "live"
 MODULES = sorted(file.stem for file in FOLDER.glob("*.js"))
-CONTROLLERS = ("fast", registry.ENERGY_SHAPING, "precise", registry.MPC_TRUE_STATE, "paper")
+CONTROLLERS = (
+    "fast", registry.ENERGY_SHAPING, "universal", registry.MPC_TRUE_STATE, "precise", "paper",
+)  # fmt: skip
 """The first ones have the first colours."""
 
 _PACKAGE = resources.files("hopping_leg")
@@ -120,6 +123,21 @@ def data(policies: dict[str, str]) -> dict[str, Any]:
             "gains": _gains(),
             "powers_of_size": POWERS_OF_SIZE,
             "forces": FORCES,
+        },
+        "any_leg": {
+            "layout": AnyLeg.name,
+            "late": AnyLeg.LATE,
+            "middle": AnyLeg.MIDDLE,
+            "command_gain": AnyLeg.COMMAND_GAIN,
+            "foot_middle": AnyLeg.FOOT_MIDDLE.tolist(),
+            "foot_gain": AnyLeg.FOOT_GAIN,
+            "velocity_gain": AnyLeg.VELOCITY_GAIN,
+            "full_torque": robot_numbers.FULL_TORQUE.tolist(),
+            "scales": robot_numbers.MIDDLES_AND_SPREADS.tolist(),
+            "least": robot_numbers.LEAST,
+            "most": robot_numbers.MOST,
+            "usual": robot_numbers.USUAL,
+            "straight_height": HEIGHT,
         },
         "shape": dataclasses.asdict(HopShape()),
         "controllers": CONTROLLERS,

@@ -145,7 +145,7 @@ const [name, robotName, command, noise, ticks, channel, sensors, jitter, bytes] 
 const robot = shippedRobot(robotName);
 const controller = name === "energy-shaping" ? new EnergyShaping(name, robot)
   : name === "mpc-true-state" ? new TrueStateMpc(robot)
-  : new Policy(Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0)), name);
+  : new Policy(Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0)), name, robot);
 const draws = { channel: () => channel.shift(), sensors: () => sensors.shift(),
   jitter: () => jitter.shift() };
 const contact = robot.reality.ground?.time_constant ?? robot.contact.time_constant;
@@ -175,6 +175,8 @@ def draws_of(seed, noisy, jitters):
     [
         ("fast", "legv2-identified", 3),
         ("precise", "legv2-identified", 3),
+        ("universal", "legv1", 3),
+        ("universal", "twin", 2),
         ("paper", "legv2-paper", 2),
         ("energy-shaping", "legv2-identified", 2),
         ("energy-shaping", "legv1", 2),
@@ -281,15 +283,15 @@ def test_the_page_obeys_and_keeps_pace(page, address, tmp_path):
         [{"name": "bad.onnx", "mimeType": "application/octet-stream", "buffer": policy[:999]}]
     )
     page.get_by_text("bad.onnx cannot be read as a policy.").wait_for()
-    for name in ("mpc-true-state", "precise", "energy-shaping", "paper", "fast"):
+    for name in ("universal", "mpc-true-state", "precise", "energy-shaping", "paper", "fast"):
         page.get_by_label("Controller", exact=True).select_option(name)
         page.locator("article .name").get_by_text(name, exact=True).first.wait_for()
     took = ask(
         page,
-        "return Promise.all([fetch('policies/precise.onnx').then((a) => a.arrayBuffer())]).then("
+        "return Promise.all([fetch('policies/universal.onnx').then((a) => a.arrayBuffer())]).then("
         "([bytes]) => { const robot = shippedRobot('legv2-identified');"
         "const settings = { payload: 0, ground: 0.02, delay: 0, noise: true };"
-        "const policy = new Policy(new Uint8Array(bytes), 'precise');"
+        "const policy = new Policy(new Uint8Array(bytes), 'universal', robot);"
         "const leg = new Leg(policy, robot, settings, 0.3); const took = [];"
         "for (let i = 0; i < 600; i++) { const now = performance.now(); leg.tick(0.3, 0);"
         "took.push(performance.now() - now); } return took; });",

@@ -3,6 +3,7 @@
 // (q1, q2, qd1, qd2), rad and rad/s; histories are newest first.
 
 import { DATA, PERIOD } from "live/data.js";
+import { fallTime, fullTorque, legLength, robotNumbers } from "live/numbers.js";
 
 const WINDOW = 11; // ticks in which a late sample may still reach a `DatedObserver`
 
@@ -94,10 +95,57 @@ class Dated {
   }
 }
 
-// Return what makes the inputs of a policy's layout, undefined if it is unknown.
-export function makeHistory(layout) {
+// The dated layout in the leg's own units, and what its robot file says of it.
+class AnyLeg extends Dated {
+  constructor(lags, robot) {
+    super(lags);
+    this.robot = robot;
+    this.numbers = Float32Array.from(robotNumbers(robot));
+    this.fullTorque = Float32Array.from(fullTorque(robot));
+  }
+
+  inputs() {
+    const { q, qd, age, past_torque: torques, command: [height] } = super.inputs();
+    const { late, middle, command_gain: gain } = DATA.any_leg;
+    const full = fullTorque(this.robot);
+    const time = fallTime(this.robot);
+    const feet = this.track ? this.lags.map((lag) => this.footMotion(this.track.samples[lag])) : [];
+    const above = (height - this.robot.foot.radius) / legLength(this.robot);
+    return {
+      foot: Float32Array.from(feet.flatMap((foot) => foot.slice(0, 2))),
+      foot_velocity: Float32Array.from(feet.flatMap((foot) => foot.slice(2))),
+      q,
+      qd: qd.map((speed) => speed * time),
+      age: age.map((seconds) => seconds / late),
+      past_torque: torques.map((torque, i) => torque / full[i % 2]),
+      command: Float32Array.of((above - middle) * gain),
+      robot: this.numbers,
+      full_torque: this.fullTorque,
+    };
+  }
+
+  // Where the foot is below and in front of the hip, and its velocity.
+  footMotion([q1, q2, qd1, qd2]) {
+    const { foot_middle: middle, foot_gain: gain, velocity_gain: ofVelocity } = DATA.any_leg;
+    const share = this.robot.thigh.length / legLength(this.robot);
+    const [s1, c1] = [share * Math.sin(q1), share * Math.cos(q1)];
+    const [s2, c2] = [(1 - share) * Math.sin(q1 + q2), (1 - share) * Math.cos(q1 + q2)];
+    const scale = ofVelocity * fallTime(this.robot);
+    return [
+      gain * (c1 + c2 - middle[0]),
+      gain * (s1 + s2 - middle[1]),
+      -scale * (qd1 * s1 + (qd1 + qd2) * s2),
+      scale * (qd1 * c1 + (qd1 + qd2) * c2),
+    ];
+  }
+}
+
+// Return what makes the inputs of a policy's layout on a robot, undefined if it is unknown.
+export function makeHistory(layout, robot) {
   if (layout === "three-samples") return new ThreeSamples();
-  return Object.hasOwn(DATA.layouts, layout) ? new Dated(DATA.layouts[layout]) : undefined;
+  if (!Object.hasOwn(DATA.layouts, layout)) return undefined;
+  const lags = DATA.layouts[layout];
+  return layout === DATA.any_leg.layout ? new AnyLeg(lags, robot) : new Dated(lags);
 }
 
 // Fills a dated history with the samples as they arrive and filters it afresh each tick: positions

@@ -44,7 +44,7 @@ function message(bytes) {
 
 const texts = (values = []) => values.map((bytes) => decoder.decode(bytes));
 
-// TensorProto: name, and values of its raw data; integers are axes and sizes that no operator needs.
+// TensorProto: name, and values of its raw data.
 function readTensor(bytes) {
   const found = message(bytes);
   const [name] = texts(found[8]);
@@ -53,7 +53,7 @@ function readTensor(bytes) {
     throw new PageError(`Its tensor '${name}' is not stored as plain single-precision numbers.`);
   }
   const raw = found[9][0].slice().buffer;
-  return [name, type === FLOAT ? new Float32Array(raw) : new Float32Array(0)];
+  return [name, type === FLOAT ? new Float32Array(raw) : Array.from(new BigInt64Array(raw), Number)];
 }
 
 function readNode(bytes) {
@@ -64,6 +64,14 @@ function readNode(bytes) {
       Object.keys(OPERATORS).join(", ")}.`);
   }
   return { operator, inputs: texts(found[1]), outputs: texts(found[2]) };
+}
+
+// ValueInfoProto: name, and how many values a row has.
+function readSize(bytes) {
+  const [name, type] = [1, 2].map((field) => message(bytes)[field][0]);
+  const shape = message(message(message(type)[1][0])[2][0]);
+  const sizes = (shape[1] ?? []).map((dimension) => message(dimension)[1]?.[0] ?? 1);
+  return [decoder.decode(name), sizes.reduce((all, size) => all * size, 1)];
 }
 
 // Return the graph in an ONNX file's bytes; throws a RangeError if they are none.
@@ -79,7 +87,7 @@ export function readOnnx(bytes) {
   return {
     nodes: (graph[1] ?? []).map(readNode),
     weights: new Map((graph[5] ?? []).map(readTensor)),
-    inputs: names(graph[11]),
+    sizes: Object.fromEntries((graph[11] ?? []).map(readSize)),
     outputs: names(graph[12]),
     metadata: Object.fromEntries(metadata),
   };
@@ -104,6 +112,13 @@ const paired = (apply) => (a, b) => {
   }
   return [result];
 };
+
+// Parts of the last axis; sizes are integers.
+function split(a, sizes) {
+  let at = 0;
+  return [...sizes].map((size) => a.slice(at, at += size));
+}
+
 const each = (apply) => (a) => [a.map(apply)];
 const same = (a) => [a];
 const sigmoid = (x) => 1 / (1 + Math.exp(-x));
@@ -150,6 +165,7 @@ const OPERATORS = {
   MatMul: (x, weight) => gemm(x, weight),
   Mul: paired((a, b) => a * b),
   Relu: each((x) => Math.max(x, 0)),
+  Split: split,
   Squeeze: same,
   Sub: paired((a, b) => a - b),
   Tanh: each(Math.tanh),

@@ -50,7 +50,7 @@ async function policyBytes(name) {
 async function makeController(name, robot) {
   if (name === "energy-shaping") return new EnergyShaping(name, robot);
   if (name === "mpc-true-state") return new TrueStateMpc(robot);
-  return new Policy(await policyBytes(name), name);
+  return new Policy(await policyBytes(name), name, robot);
 }
 
 const settings = () => ({
@@ -200,7 +200,7 @@ async function open(file) {
   const { name } = file; // with its ending, so that no shipped policy has it
   if (name.endsWith(".onnx")) {
     const bytes = new Uint8Array(await file.arrayBuffer());
-    void new Policy(bytes, name); // refused before it is listed
+    void new Policy(bytes, name, robots.get($("robot").value)); // refused before it is listed
     policies.set(name, bytes);
     choose("first", name);
   } else if (name.endsWith(".toml")) {

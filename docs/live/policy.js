@@ -2,12 +2,14 @@
 
 import { DATA, PageError } from "live/data.js";
 import { makeHistory } from "live/history.js";
+import { legLength } from "live/numbers.js";
 import { readOnnx, runOnnx } from "live/onnx.js";
 
 export class Policy {
-  // Read an ONNX file's bytes; messages name it.
-  constructor(bytes, name) {
+  // Read an ONNX file's bytes; messages name it. It is told the robot's numbers if it asks for them.
+  constructor(bytes, name, robot) {
     this.name = name;
+    this.robot = robot;
     try {
       this.graph = readOnnx(bytes);
     } catch (error) {
@@ -25,32 +27,36 @@ export class Policy {
       throw new PageError(`${name} has a damaged policy card; export the policy again.`);
     }
     const { layout, rate } = this.card;
-    if (!makeHistory(layout)) {
+    if (!makeHistory(layout, robot)) {
       throw new PageError(`${name} has the observation layout '${layout}'; this page knows: ${
         ["three-samples", ...Object.keys(DATA.layouts)].join(", ")}.`);
     }
     if (rate !== DATA.rate) {
       throw new PageError(`${name} was trained at ${rate} Hz; this page runs at ${DATA.rate} Hz.`);
     }
-    // A gated recurrent unit has two biases for each of three gates.
-    this.memorySize = this.graph.inputs.includes("memory")
-      ? this.graph.weights.get("gru_bias").length / 6 : 0;
+    this.forAnyLeg = layout === DATA.any_leg.layout;
+    this.memorySize = this.graph.sizes.memory ?? 0;
     this.reset();
-    this.act({ back: [0, 1, 2], samples: Array(3).fill([0, 0, 0, 0, this.card.command_low]) });
+    this.act({ back: [0, 1, 2], samples: Array(3).fill([0, 0, 0, 0, this.range[0]]) });
   }
 
   // Heights that it can be asked for, m.
-  get range() { return [this.card.command_low, this.card.command_high]; }
+  get range() {
+    const { card: { command_low: low, command_high: high }, robot } = this;
+    const size = this.forAnyLeg
+      ? (legLength(robot) + robot.foot.radius) / DATA.any_leg.straight_height : 1;
+    return [size * low, size * high];
+  }
 
   // A sentence if a robot is not that of its training, or "".
   stranger(robot) {
     const { card, name } = this;
-    return card.robot === robot.name ? ""
+    return this.forAnyLeg || card.robot === robot.name ? ""
       : `${name} was trained on ${card.robot}, not on ${robot.name}.`;
   }
 
   reset() {
-    this.history = makeHistory(this.card.layout);
+    this.history = makeHistory(this.card.layout, this.robot);
     this.torque = [0, 0];
     this.memory = new Float32Array(this.memorySize);
   }

@@ -214,6 +214,14 @@ class AnyLeg(Dated):
     name: ClassVar[str] = "any-leg"
     COMMAND_GAIN: ClassVar[float] = 4.0
     """Of commands over the leg's length, so that they lie about between -1 and 1."""
+    MIDDLE: ClassVar[float] = 1.05
+    """Of commands over the leg's length."""
+    FOOT_MIDDLE: ClassVar[Array] = np.array([0.7, 0.0])
+    FOOT_GAIN: ClassVar[float] = 4.0
+    VELOCITY_GAIN: ClassVar[float] = 1.5
+    """Of the foot's position and velocity, so that they lie about between -1 and 1."""
+    LATE: ClassVar[float] = 0.025
+    """Age of a sample that is shown as 1, s."""
     shapes: ClassVar[dict[str, tuple[int, ...]]] = {
         "foot": (len(Dated.LAGS), 2),
         "foot_velocity": (len(Dated.LAGS), 2),
@@ -247,9 +255,9 @@ class AnyLeg(Dated):
             "foot_velocity": (velocity * self._time).astype(np.float32),
             "q": seen["q"],
             "qd": (seen["qd"] * self._time).astype(np.float32),
-            "age": seen["age"] * np.float32(1 / _LATE),
+            "age": seen["age"] * np.float32(1 / self.LATE),
             "past_torque": (seen["past_torque"] / self.full_torque[:, None]).astype(np.float32),
-            "command": ((height - _MIDDLE) * self.COMMAND_GAIN).astype(np.float32),
+            "command": ((height - self.MIDDLE) * self.COMMAND_GAIN).astype(np.float32),
             "robot": _repeat(self._numbers, count),
             FULL_TORQUE: _repeat(self.full_torque, count),
         }
@@ -262,20 +270,13 @@ class AnyLeg(Dated):
         thigh, shank = self._share * thigh, (1 - self._share) * shank
         rate = qd.sum(axis=-1)[..., None]
         turned = qd[..., :1] * thigh[..., ::-1] + rate * shank[..., ::-1]
-        return _FOOT_GAIN * (thigh + shank - _FOOT_MIDDLE), _VELOCITY_GAIN * _TURN * turned
+        return self.FOOT_GAIN * (
+            thigh + shank - self.FOOT_MIDDLE
+        ), self.VELOCITY_GAIN * _TURN * turned
 
 
 _TURN = np.array([-1.0, 1.0])
 """Signs of the derivatives of cosine and sine."""
-
-_FOOT_MIDDLE, _FOOT_GAIN, _VELOCITY_GAIN = np.array([0.7, 0.0]), 4.0, 1.5
-"""Of the foot's position and velocity, so that they lie about between -1 and 1."""
-
-_LATE = 0.025
-"""Age of a sample that is shown as 1, s."""
-
-_MIDDLE = 1.05
-"""Of commands over the leg's length."""
 
 
 def _repeat(values: Array, count: int) -> Array32:

@@ -11,13 +11,13 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.robot import GRAVITY, Joint, Link, Robot
 
-_LEAST = 1e-5
+LEAST = 1e-5
 """What a friction or inertia without a unit is at least, where its logarithm is taken."""
 
-_MOST = 3.0
+MOST = 3.0
 """Largest number that a policy is told."""
 
-_MIDDLES_AND_SPREADS = np.array(
+MIDDLES_AND_SPREADS = np.array(
     [
         (0.0, 0.2), (0.07, 0.3),  # length over leg V2's, thigh over shank (logarithms)
         (0.25, 0.3), (-0.67, 0.25), (-0.9, 0.3), (-2.8, 0.4),  # mass over leg V2's; its shares
@@ -32,13 +32,16 @@ _MIDDLES_AND_SPREADS = np.array(
         (0.08, 0.06), (0.21, 0.08), (-2.9, 0.8), (1.36, 0.2), (1.83, 0.2), (1.4, 0.15), (0, 0.15),
     ]
 )  # fmt: skip
+"""Middle and spread of each number over the legs of the training."""
 
-COUNT = len(_MIDDLES_AND_SPREADS)
+COUNT = len(MIDDLES_AND_SPREADS)
 """How many there are."""
 
-_LENGTH, _MASS, _TIME_CONSTANT = 0.29, 1.45, 0.03
+USUAL = {"length": 0.29, "mass": 1.45, "time_constant": 0.03}
+"""Leg V2's length, m, and mass, kg, and a ground's time constant, s, over which others are told."""
 
-_FULL_TORQUE = np.array([2.2, 4.6])
+FULL_TORQUE = np.array([2.2, 4.6])
+"""Joint torques of a full action over the weight times L."""
 
 
 def leg_length(robot: Robot) -> float:
@@ -48,7 +51,7 @@ def leg_length(robot: Robot) -> float:
 
 def full_torque(robot: Robot) -> Array:
     """Return the joint torques of a full action, N m, (2,): multiples of the weight times L."""
-    torque: Array = _FULL_TORQUE * robot.mass * GRAVITY * leg_length(robot)
+    torque: Array = FULL_TORQUE * robot.mass * GRAVITY * leg_length(robot)
     return torque
 
 
@@ -63,7 +66,7 @@ def robot_numbers(robot: Robot) -> Array:
     weight = mass * GRAVITY
 
     def inertia(value: float) -> float:
-        return math.log(max(value / (mass * length**2), _LEAST))
+        return math.log(max(value / (mass * length**2), LEAST))
 
     def of_link(link: Link) -> float:
         return inertia(link.inertia)
@@ -82,9 +85,9 @@ def robot_numbers(robot: Robot) -> Array:
 
     values = np.array(
         [
-            math.log(length / _LENGTH),
+            math.log(length / USUAL["length"]),
             math.log(robot.thigh.length / robot.shank.length),
-            math.log(mass / _MASS),
+            math.log(mass / USUAL["mass"]),
             *(math.log(part.mass / mass) for part in (robot.base, robot.thigh, robot.shank)),
             robot.thigh.com / robot.thigh.length,
             robot.shank.com / robot.shank.length,
@@ -93,12 +96,12 @@ def robot_numbers(robot: Robot) -> Array:
             robot.foot.radius / length,
             robot.rail.friction / weight,
             robot.rail.damping * time / mass,
-            math.log(robot.contact.time_constant / _TIME_CONSTANT),
+            math.log(robot.contact.time_constant / USUAL["time_constant"]),
             robot.contact.damping_ratio,
             *of_joint(robot.hip),
             *of_joint(robot.knee),
         ]
     )
-    middle, spread = _MIDDLES_AND_SPREADS.T
-    numbers: Array = np.clip((values - middle) / spread, -_MOST, _MOST)
+    middle, spread = MIDDLES_AND_SPREADS.T
+    numbers: Array = np.clip((values - middle) / spread, -MOST, MOST)
     return numbers
