@@ -80,7 +80,7 @@ def load_policy(name_or_path: str | Path) -> Policy:
 
 
 def robot_of(controllers: Sequence[str]) -> str:
-    """Return the robot that the first policy or gain file among controllers was made for.
+    """Return the robot that the first policy or gain file among controllers was made for alone.
 
     It is a shipped name, or the file that a training leaves beside its policy; without any, the
     default robot.
@@ -90,7 +90,9 @@ def robot_of(controllers: Sequence[str]) -> str:
         text = str(found[0]) if found else text
         name = text if Path(text).exists() else text.rpartition("=")[2]
         if name in shipped_policies() or (name.endswith(".onnx") and Path(name).is_file()):
-            return _robot_of_policy(load_policy(name).card, Path(name).with_name(ROBOT_FILE))
+            policy = load_policy(name)
+            if not policy.for_any_leg:
+                return _robot_of_policy(policy.card, Path(name).with_name(ROBOT_FILE))
         if name.endswith(".toml") and Path(name).is_file():
             robot = load_gains(name).robot
             return robot if robot in shipped_robots() or Path(robot).is_file() else DEFAULT_ROBOT
