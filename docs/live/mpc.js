@@ -21,6 +21,9 @@ const STRETCHED = 0.97; // share of the stretched length at which a push ends in
 const FALL = 0.3; // force over the weight with which a leg sinks until it has to brake
 const REST_SPEED = 0.1; // speed of the hip on landing that counts as rest, m/s
 const LEAST_STROKE = 0.08; // of a landing, over the stretched length
+const SINK = 2; // that the foot sinks in, over that at rest
+const MOST_SINK = 0.25; // and over the length, at most
+const LOWERS = 0.35; // by how much of it the knee comes nearer to the ground
 const LEAST_PUSH = 0.2; // push-off force over the weight
 const MOST_PUSH = 14;
 const REST = 0.02; // speed of the hip below which a landing ends, m/s
@@ -30,13 +33,19 @@ const LATE = 0.6; // share of the push's way below which a landing may end
 function shapeHop(p, shape, command, hop) {
   const length = p.thigh_length + p.shank_length;
   const above = command - p.foot_radius;
+  const sink = Math.min(SINK * p.gravity / p.contact_stiffness, MOST_SINK * length);
+  const knee = p.knee_radius - p.foot_radius + shape.knee_gap * length + LOWERS * sink;
+  const bent = knee ** 2 + p.thigh_length ** 2 - p.shank_length ** 2;
+  const folded = knee + Math.sqrt(Math.max(bent, 0));
   hop.flight = Math.min(shape.flight_length * length, above - shape.clearance * length);
+  hop.flight = Math.max(hop.flight, folded + LEAST_STROKE * length);
   const drop = Math.max(above - hop.flight, 0);
   hop.liftoff = Math.min(
     hop.flight + shape.least_push * length + shape.liftoff_per_drop * drop, shape.liftoff * length,
   );
   const squat = shape.squat * length - shape.squat_per_drop * drop;
   hop.squat = Math.min(squat, Math.min(hop.flight, hop.liftoff) - LEAST_STROKE * length);
+  hop.squat = Math.max(hop.squat, folded);
   hop.stop = shape.braking * p.gravity * drop / Math.max(hop.flight - hop.squat, 0.02 * length);
 }
 

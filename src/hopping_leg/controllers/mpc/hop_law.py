@@ -38,6 +38,8 @@ _FALL = 0.3  # force over the weight with which a leg sinks until it has to brak
 _LEAST_STROKE = 0.08  # of a landing, over the stretched length
 _LEAST_PUSH, _MOST_PUSH = 0.2, 14.0  # push-off force over the weight
 _REST = 0.02  # speed of the hip below which a landing ends, m/s
+_SINK, _MOST_SINK = 2.0, 0.25  # that the foot sinks in, over that at rest and over the length
+_LOWERS = 0.35  # by how much of it the knee comes nearer to the ground
 _SPRINGS = 6  # control periods of a flight until transmissions have given back their energy
 _LATE = 0.6  # share of the push's way below which a landing may end
 
@@ -47,7 +49,14 @@ def shape_hop(p: Record, shape: Record, command: float, hop: Record) -> None:
     """Set the numbers of a hop to a height, m; the push-off force stays."""
     length = p.thigh_length + p.shank_length
     above = command - p.foot_radius
+    # A leg with a longer thigh than shank folds no further than until its knee is near the ground,
+    # in which the foot sinks.
+    sink = min(_SINK * p.gravity / p.contact_stiffness, _MOST_SINK * length)
+    knee = p.knee_radius - p.foot_radius + shape.knee_gap * length + _LOWERS * sink
+    thigh, shank = p.thigh_length, p.shank_length
+    folded = knee + math.sqrt(max(knee * knee + thigh * thigh - shank * shank, 0.0))
     hop.flight = min(shape.flight_length * length, above - shape.clearance * length)
+    hop.flight = max(hop.flight, folded + _LEAST_STROKE * length)
     drop = max(above - hop.flight, 0.0)
     hop.liftoff = min(
         hop.flight + shape.least_push * length + shape.liftoff_per_drop * drop,
@@ -55,6 +64,7 @@ def shape_hop(p: Record, shape: Record, command: float, hop: Record) -> None:
     )
     squat = shape.squat * length - shape.squat_per_drop * drop
     hop.squat = min(squat, min(hop.flight, hop.liftoff) - _LEAST_STROKE * length)
+    hop.squat = max(hop.squat, folded)
     hop.stop = shape.braking * p.gravity * drop / max(hop.flight - hop.squat, 0.02 * length)
 
 

@@ -47,6 +47,8 @@ class HopShape:
     """Length from hip to foot in flight."""
     clearance: float = 0.2
     """Least gap between the foot in flight and the ground at the apex."""
+    knee_gap: float = 0.04
+    """Least gap between knee and ground."""
     squat: float = 0.61
     """Height of the hip, less the foot's radius, at which landing ends."""
     squat_per_drop: float = 0.26
