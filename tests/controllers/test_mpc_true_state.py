@@ -117,10 +117,10 @@ SHAPE = np.rec.array([astuple(HopShape())], [(f.name, np.float64) for f in field
 NUMBERS = ("flight", "squat", "liftoff", "stop")
 
 
-def shaped(thigh, shank, foot, command):
+def shaped(thigh, shank, foot, command, stiffness=1e3):
     """Return the numbers of a hop."""
     leg = [("thigh_length", thigh), ("shank_length", shank), ("foot_radius", foot),
-           ("knee_radius", foot), ("gravity", GRAVITY), ("contact_stiffness", 1e3)]  # fmt: skip
+           ("knee_radius", foot), ("gravity", GRAVITY), ("contact_stiffness", stiffness)]  # fmt: skip
     leg = np.rec.array([tuple(v for _, v in leg)], [(name, np.float64) for name, _ in leg])[0]
     numbers = np.rec.array(np.zeros(1, hop_law.HOP))[0]
     hop_law.shape_hop.py_func(leg, SHAPE, command, numbers)
@@ -144,7 +144,7 @@ def test_lengths_of_a_hop_fit_the_leg_rise_with_the_height_and_grow_with_the_leg
         assert stop >= 0
     rising = [0, 2]
     assert (low[rising] <= high[rising] + 1e-12).all()
-    scaled = shaped(*(0.29 * np.array([*leg, min(heights) + foot])))
+    scaled = shaped(*(0.29 * np.array([*leg, min(heights) + foot])), stiffness=1e3 / 0.29)
     np.testing.assert_allclose(scaled, low * [0.29, 0.29, 0.29, 1.0])
 
 
