@@ -120,7 +120,8 @@ NUMBERS = ("flight", "squat", "liftoff", "stop")
 def shaped(thigh, shank, foot, command, stiffness=1e3):
     """Return the numbers of a hop."""
     leg = [("thigh_length", thigh), ("shank_length", shank), ("foot_radius", foot),
-           ("knee_radius", foot), ("gravity", GRAVITY), ("contact_stiffness", stiffness)]  # fmt: skip
+           ("knee_radius", foot), ("gravity", GRAVITY),
+           ("contact_stiffness", stiffness)]  # fmt: skip
     leg = np.rec.array([tuple(v for _, v in leg)], [(name, np.float64) for name, _ in leg])[0]
     numbers = np.rec.array(np.zeros(1, hop_law.HOP))[0]
     hop_law.shape_hop.py_func(leg, SHAPE, command, numbers)
