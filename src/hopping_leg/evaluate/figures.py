@@ -98,7 +98,8 @@ def draw_phase_space(traces: Mapping[str, Trace]) -> Figure:
         row[0].set_ylabel("knee velocity / (rad/s)")
     for axes in panels[-1]:
         axes.set_xlabel("knee angle / rad")
-    panels[0][0].legend(loc="lower right")
+    if panels[0][0].get_legend_handles_labels()[0]:
+        panels[0][0].legend(loc="lower right")
     figure.colorbar(dots, ax=panels, label="knee torque asked for / N m", extend="both", aspect=40)
     return figure
 
