@@ -21,15 +21,19 @@ class Lock:
     """Holds a device or file until ``close``.
 
     Args:
-        path: Device, or a file that is made if there is none.
+        path: Device or file.
         what: Its name in messages.
         error: Raised where somebody else holds it; says who.
+        make: Whether the file is made if there is none; a device that is gone must not become one.
     """
 
-    def __init__(self, path: Path, what: str, error: type[HoppingLegError]) -> None:
+    def __init__(
+        self, path: Path, what: str, error: type[HoppingLegError], *, make: bool = True
+    ) -> None:
         flags = os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK
         try:
-            self._descriptor = os.open(path, flags if path.exists() else flags | os.O_CREAT, 0o644)
+            made = os.O_CREAT if make and not path.exists() else 0
+            self._descriptor = os.open(path, flags | made, 0o644)
         except OSError as problem:
             raise error(f"Cannot open {path}: {problem.strerror}.") from problem
         busy, terminal = False, os.isatty(self._descriptor)

@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.progress import Progress
 from rich.table import Table
 
 from hopping_leg.cli.options import at_least
 from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.progress import ShareProgress
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
 from hopping_leg.workers import ProcessWorkers
 from studies.fault_campaign.case import Case, Result
@@ -249,14 +249,13 @@ class Faults(Campaign):
         """Run it, print a table, return every number."""
         at_least(1, repeats=self.repeats)
         at_least(0, seed=self.seed, workers=self.workers, live=self.live)
-        with Progress(console=Console(stderr=True)) as bar:
-            task = bar.add_task("trials", total=None)
+        with ShareProgress() as bar:
             result = run_campaign(
                 self,
                 self.out,
                 workers=self.workers,
-                on_trial=lambda done, total, unsafe: bar.update(
-                    task, completed=done, total=total, description=f"trials, {unsafe} unsafe"
+                on_trial=lambda done, total, unsafe: bar.show(
+                    f"trials, {unsafe} unsafe", done / total
                 ),
             )
         _print(result)

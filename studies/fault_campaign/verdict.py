@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import takewhile
 
 from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.deploy.safety_limits import SafetyLimits
@@ -80,6 +81,7 @@ def reaction(log: WireLog, limits: Limits, since: float, *, jumped: bool) -> flo
     """
     safe = (told.time for told in log.commands if told.time >= since and told.mode in SAFE)
     done = next(safe, math.inf)
-    before = (answer for answer in log.answers if since < answer.time < done)
-    seen = next((answer.time for answer in before if jumped or limits.bad(answer)), None)
+    before = takewhile(lambda answer: answer.time < done, log.answers(since))
+    bad = (a.time for a in before if a.time > since and (jumped or limits.bad(a)))
+    seen = next(bad, None)
     return None if seen is None else done - seen

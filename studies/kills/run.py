@@ -153,7 +153,7 @@ def kill(verb: Verb, folder: Path, kills: int, rng: np.random.Generator) -> dict
                 except subprocess.TimeoutExpired:
                     processes += _kill(running)
                     done += 1
-                    bar.show(f"{verb.name}, {done} of {kills} kills", done / kills)
+                    bar.show(verb.name, done / kills)
                 else:
                     break
             if not _finish(_start(verb.words, folder, out)):

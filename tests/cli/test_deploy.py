@@ -185,7 +185,7 @@ EMULATE, TRANSPORT = ["emulate", "--seconds", "0"], ["doctor", "--transport"]
         ([*EMULATE, "--faults", "none.toml"], "no fault script none.toml"),
         ([*EMULATE, "--seed", "-1"], "--seed is -1"),
         ([*EMULATE, "--channel", "x"], "A channel is for CAN buses"),
-        ([*TRANSPORT, "/dev/none"], "There is no serial port /dev/none"),
+        ([*TRANSPORT, "/none/port"], "There is no serial port /none/port"),
         ([*TRANSPORT, "usb"], "There is no transport 'usb'"),
         ([*TRANSPORT, "socketcn:can0"], "python-can has no interface 'socketcn'"),
         ([*TRANSPORT, "pi3hat"], "moteus-pi3hat"),

@@ -69,6 +69,12 @@ def test_the_adapter_reads_whole_lines_whatever_its_port_takes(terminal):
     port.close()
 
 
+def test_a_port_that_is_gone_is_refused_and_no_file_takes_its_place(tmp_path):
+    with pytest.raises(HardwareError, match="Cannot open"):
+        Fdcanusb(str(tmp_path / "gone"))
+    assert not list(tmp_path.iterdir())
+
+
 def test_an_adapter_that_asks_for_checksums_gets_them(terminal):
     master, slave = terminal
     adapter, port = LineProtocol(), Fdcanusb(os.ttyname(slave), checksums=False)

@@ -82,9 +82,9 @@ def test_an_answer_is_logged_as_it_travels_if_it_tells_the_state(resolution, tol
     bench = Bench()
     bench.robot.drives[0].disturbances.temperature = 35.04
     bench.read(R.POSITION, R.TEMPERATURE)
-    assert not bench.robot.log.answers
+    assert not list(bench.robot.log.answers())
     bench.read(R.MODE, R.FAULT, R.VOLTAGE, R.TEMPERATURE, resolution=resolution)
-    (answer,) = bench.robot.log.answers
+    (answer,) = bench.robot.log.answers()
     assert answer.temperature == pytest.approx(told, abs=1e-5)
 
 

@@ -83,6 +83,29 @@ class ReplyWriter:
         self._buffer.write(data)
 
 
+@functools.lru_cache(maxsize=16)
+def _parts(
+    data: bytes,
+) -> tuple[
+    tuple[RegisterSubframe, ...],
+    tuple[RegisterSubframe, ...],
+    tuple[StreamSubframe | FlowStreamSubframe, ...],
+]:
+    """Return a payload's writes, reads and streams; a host often says the same again."""
+    writes: list[RegisterSubframe] = []
+    reads: list[RegisterSubframe] = []
+    streams: list[StreamSubframe | FlowStreamSubframe] = []
+    with contextlib.suppress(Exception):  # the parser raises whatever a short buffer leads to
+        for s in itertools.islice(multiplex.parse_frame(data), _MOST):
+            if isinstance(s, StreamSubframe | FlowStreamSubframe):
+                streams.append(s)
+            elif isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE:
+                writes.append(s)
+            elif isinstance(s, RegisterSubframe) and s.type is SubframeType.READ:
+                reads.append(s)
+    return tuple(writes), tuple(reads), tuple(streams)
+
+
 @dataclass(frozen=True)
 class Message:
     """A frame and what its payload says, up to the first subframe that makes no sense.
@@ -101,18 +124,7 @@ class Message:
     @staticmethod
     def read(frame: frames.Frame) -> "Message":
         """Return the message of a frame."""
-        writes: list[RegisterSubframe] = []
-        reads: list[RegisterSubframe] = []
-        streams: list[StreamSubframe | FlowStreamSubframe] = []
-        with contextlib.suppress(Exception):  # the parser raises whatever a short buffer leads to
-            for s in itertools.islice(multiplex.parse_frame(frame.data), _MOST):
-                if isinstance(s, StreamSubframe | FlowStreamSubframe):
-                    streams.append(s)
-                elif isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE:
-                    writes.append(s)
-                elif isinstance(s, RegisterSubframe) and s.type is SubframeType.READ:
-                    reads.append(s)
-        return Message(frame, tuple(writes), tuple(reads), tuple(streams))
+        return Message(frame, *_parts(frame.data))
 
     def is_for(self, drive: EmulatedDrive) -> bool:
         """Whether it means a drive: by its id, and by its UUID or that's beginning where given."""

@@ -67,7 +67,14 @@ class EmulatedDrive:
         self.uptime = 0.0
         self._brake, self.nominal_voltage = brake * 2 * math.pi, voltage
         self._commanded = False
+        settings.follow(self._take)
         self._warmth = self._velocity = self._torque = self._asked = 0.0
+
+    def _take(self, settings: Settings) -> None:
+        self._low, self._high = settings["servopos.position_min"], settings["servopos.position_max"]
+        self._timeout_mode = int(settings["servo.timeout_mode"])
+        self._max_voltage = settings["servo.max_voltage"]
+        self._fault_temperature = settings["servo.fault_temperature"]
 
     @property
     def id(self) -> int:
@@ -146,14 +153,14 @@ class EmulatedDrive:
         """Begin one step of physics; return the torque asked of the motor's output, N m, finite."""
         self.uptime += dt
         self._warmth += dt / _WARMING_TIME * (_HEATING * self._amperes**2 - self._warmth)
-        low, high = self.settings.position_bounds
-        outside = self.encoder.position < low or self.encoder.position > high
+        position = self.encoder.position
+        outside = position < self._low or position > self._high
         bounded = not self.command.ignore_bounds
         if self.machine.advance(time, outside_limits=bounded and outside):
             self.law.begin()
         self._check()
         self.law.notice = 0
-        wanted = self._asked = self._control(dt)
+        wanted = self._asked = self._control(position, dt)
         if self.active:
             self.machine.fault = self.disturbances.notice or self.law.notice
         if math.isnan(wanted):
@@ -161,11 +168,11 @@ class EmulatedDrive:
             return 0.0
         return self.encoder.torque_to_output(wanted)
 
-    def _control(self, dt: float) -> float:
+    def _control(self, position: float, dt: float) -> float:
         mode, command, law = self.machine.mode, self.command, self.law
-        position, velocity = self.encoder.position, self._velocity
+        velocity = self._velocity
         if mode is DriveMode.TIMEOUT:
-            mode = DriveMode(int(self.settings["servo.timeout_mode"]))
+            mode = DriveMode(self._timeout_mode)
             command = torque_law.Command(mode, position=math.nan, kd_scale=command.kd_scale)
         if mode is DriveMode.POSITION:
             torque = law.position(command, position, velocity, dt)
@@ -182,14 +189,14 @@ class EmulatedDrive:
 
     def _check(self) -> None:
         """Go to fault where the firmware would."""
-        machine, settings = self.machine, self.settings
+        machine = self.machine
         if self.disturbances.fault:
             machine.trip(self.disturbances.fault)
-        if self.voltage > settings["servo.max_voltage"]:
+        if self.voltage > self._max_voltage:
             machine.trip(FaultCode.OVER_VOLTAGE)
         if self.voltage < _LOWEST_VOLTAGE:
             machine.trip(FaultCode.UNDER_VOLTAGE)
-        if self.temperature > settings["servo.fault_temperature"]:
+        if self.temperature > self._fault_temperature:
             machine.trip(FaultCode.OVER_TEMPERATURE)
 
     def stored(self, register: int) -> float | None:

@@ -97,7 +97,7 @@ class EmulatedRobot:
                 continue
             errors = [] if late else bus.act(message, drive, self.time)
             answer = bus.answer(message, drive, self.time, errors)
-            self.log.record_command(self.time, joint, frame)
+            self.log.record_command(self.time, joint, message)
             if answer is not None:
                 self.log.record_reply(self.time, joint, answer)
                 self.fault_injector.send(answer, joint)

@@ -18,18 +18,17 @@ class RotorEncoder:
     """
 
     def __init__(self, settings: Settings, gear_ratio: float) -> None:
-        self._settings, self.gear_ratio = settings, gear_ratio
+        self.gear_ratio = gear_ratio
+        self._ratio = self._sign = self._offset = 0.0
+        settings.follow(self._take)
         self.home = _HOMED_ROTOR
         self._rotor = self._shift = 0.0
         self.jump = 0.0  # Turns of the rotor by which the encoder errs since a fault
 
-    @property
-    def _ratio(self) -> float:
-        return self._settings["motor_position.rotor_to_output_ratio"]
-
-    @property
-    def _sign(self) -> float:
-        return self._settings["motor_position.output.sign"]
+    def _take(self, settings: Settings) -> None:
+        self._ratio = settings["motor_position.rotor_to_output_ratio"]
+        self._sign = settings["motor_position.output.sign"]
+        self._offset = settings["motor_position.output.offset"]
 
     def boot(self, output: float) -> None:
         """Begin anew with the true output at a position, revolutions."""
@@ -49,9 +48,8 @@ class RotorEncoder:
     @property
     def position(self) -> float:
         """Output as the firmware reports it, revolutions."""
-        offset = self._settings["motor_position.output.offset"]
         rotor = self._rotor + self._shift + self.jump
-        return self._sign * (rotor * self._ratio + offset)
+        return self._sign * (rotor * self._ratio + self._offset)
 
     def velocity(self, output: float) -> float:
         """Return the reported velocity for a true one of the output, rev/s."""

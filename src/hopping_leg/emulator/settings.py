@@ -4,6 +4,10 @@ Defaults are those of firmware for the controller board r4 with what the qdd100 
 only values that the emulator obeys or a host may want to check are here.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable
+
 from hopping_leg.errors import UsageError, unknown_name
 
 _NAN = float("nan")
@@ -66,6 +70,7 @@ class Settings:
     """
 
     def __init__(self, **changes: float) -> None:
+        self._followers: list[Callable[[Settings], None]] = []
         self._values = dict(DEFAULTS)
         for name, value in changes.items():
             self.set(name, str(value))
@@ -74,10 +79,14 @@ class Settings:
     def __getitem__(self, name: str) -> float:
         return float(self._values[name])
 
-    @property
-    def position_bounds(self) -> tuple[float, float]:
-        """Lowest and highest position of the output, revolutions."""
-        return self["servopos.position_min"], self["servopos.position_max"]
+    def follow(self, take: Callable[[Settings], None]) -> None:
+        """Let somebody who asks at every step take what he needs now and after every change."""
+        self._followers.append(take)
+        take(self)
+
+    def _changed(self) -> None:
+        for take in self._followers:
+            take(self)
 
     def set(self, name: str, text: str) -> None:
         """Change a value in RAM; a ``UsageError`` tells of an unknown name or no number."""
@@ -88,6 +97,7 @@ class Settings:
             self._values[name] = kind(float(text)) if kind is int else float(text)
         except ValueError as error:
             raise UsageError(f"'{text}' is no value for the drive setting '{name}'.") from error
+        self._changed()
 
     def text(self, name: str) -> str:
         """Return a value as the firmware prints it."""
@@ -105,7 +115,9 @@ class Settings:
     def load(self) -> None:
         """Read flash to RAM, as after power was lost."""
         self._values = dict(self._saved)
+        self._changed()
 
     def reset(self) -> None:
         """Set RAM to the firmware's defaults."""
         self._values = dict(DEFAULTS)
+        self._changed()

@@ -73,9 +73,22 @@ class TorqueLaw:
     """The position controller of one drive and the limits behind it."""
 
     def __init__(self, settings: Settings) -> None:
-        self._settings = settings
+        settings.follow(self._take)
         self.begin()
         self.notice = 0  # Limit that was at work in the last step, 0 if none
+
+    def _take(self, settings: Settings) -> None:
+        self._kp, self._kd = (settings[f"servo.pid_position.{gain}"] for gain in ("kp", "kd"))
+        self._timeout_torque = settings["servo.timeout_max_torque_Nm"]
+        self._max_velocity = settings["servo.max_velocity"]
+        self._velocity_derate = settings["servo.max_velocity_derate"]
+        self._amperes = settings["servo.max_current_A"]
+        self._hot_amperes = settings["servo.derate_current_A"]
+        self._margin = settings["servo.temperature_margin"]
+        self._hot = settings["servo.fault_temperature"] - self._margin
+        self._low, self._high = settings["servopos.position_min"], settings["servopos.position_max"]
+        self._derate = settings["servo.position_derate"]
+        self._ratio = settings["motor_position.rotor_to_output_ratio"]
 
     def begin(self) -> None:
         """Forget where the last mode was heading."""
@@ -91,13 +104,11 @@ class TorqueLaw:
         return self._within(torque, command.max_torque)
 
     def _gains(self, command: Command) -> tuple[float, float]:
-        kp, kd = (self._settings[f"servo.pid_position.{gain}"] for gain in ("kp", "kd"))
-        return kp * command.kp_scale, kd * command.kd_scale
+        return self._kp * command.kp_scale, self._kd * command.kd_scale
 
     def zero_velocity(self, kd_scale: float, velocity: float) -> float:
         """Return the torque of zero-velocity mode, N m."""
-        damp = self._settings["servo.pid_position.kd"] * kd_scale
-        return self._within(-damp * velocity, self._settings["servo.timeout_max_torque_Nm"])
+        return self._within(-self._kd * kd_scale * velocity, self._timeout_torque)
 
     def stay_within(self, command: Command, position: float, velocity: float) -> float:
         """Return the torque of stay-within mode, N m: none but feedforward inside the bounds."""
@@ -120,34 +131,28 @@ class TorqueLaw:
         """
         if bounds:
             torque = self._in_bounds(torque, position)
-        highest = self._settings["servo.max_velocity"]
-        amperes = self._settings["servo.max_current_A"]
+        highest, amperes = self._max_velocity, self._amperes
         if abs(velocity) > highest and torque * velocity > 0:
-            over = (abs(velocity) - highest) / self._settings["servo.max_velocity_derate"]
+            over = (abs(velocity) - highest) / self._velocity_derate
             torque = self._capped(torque, max(0.0, 1 - over) * amperes, Notice.MAX_VELOCITY)
         return self._cooled(torque, amperes, temperature)
 
     def _cooled(self, torque: float, amperes: float, temperature: float) -> float:
-        margin = self._settings["servo.temperature_margin"]
-        begin = self._settings["servo.fault_temperature"] - margin
-        hot = (temperature - begin) / margin
+        hot = (temperature - self._hot) / self._margin
         if hot <= 0:
             return self._capped(torque, amperes, Notice.MAX_CURRENT)
-        least = self._settings["servo.derate_current_A"]
-        left = min(amperes, max(0.0, amperes + hot * (least - amperes)))
+        left = min(amperes, max(0.0, amperes + hot * (self._hot_amperes - amperes)))
         return self._capped(torque, left, Notice.FET_TEMPERATURE)
 
     def _in_bounds(self, torque: float, position: float) -> float:
-        low, high = self._settings.position_bounds
-        beyond = max(position - high, 0.0) if torque > 0 else max(low - position, 0.0)
+        beyond = max(position - self._high, 0.0) if torque > 0 else max(self._low - position, 0.0)
         if not beyond > 0:
             return torque
         self.notice = Notice.POSITION_BOUNDS
-        return torque * max(0.0, 1 - beyond / self._settings["servo.position_derate"])
+        return torque * max(0.0, 1 - beyond / self._derate)
 
     def _capped(self, torque: float, amperes: float, notice: Notice) -> float:
-        ratio = self._settings["motor_position.rotor_to_output_ratio"]
-        return self._within(torque, amperes * TORQUE_CONSTANT / ratio, notice)
+        return self._within(torque, amperes * TORQUE_CONSTANT / self._ratio, notice)
 
     def _within(self, torque: float, most: float, notice: Notice = Notice.MAX_TORQUE) -> float:
         if abs(torque) > most:
@@ -174,11 +179,10 @@ class TorqueLaw:
                 command.position = math.nan
             else:
                 self.control_velocity = math.copysign(command.velocity_limit, gap)
-        low, high = self._settings.position_bounds
-        if not math.isnan(high):
-            self.control_position = min(self.control_position, high)
-        if not math.isnan(low):
-            self.control_position = max(self.control_position, low)
+        if not math.isnan(self._high):
+            self.control_position = min(self.control_position, self._high)
+        if not math.isnan(self._low):
+            self.control_position = max(self.control_position, self._low)
 
 
 WITH_BOUNDS = (

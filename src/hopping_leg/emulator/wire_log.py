@@ -5,6 +5,7 @@ soon after a bad answer the host reacted. Times are in s; joint 0 is the hip, 1 
 """
 
 from collections import deque
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from moteus.protocol import Register, parse_reply
@@ -56,48 +57,44 @@ class WireLog:
     """Commands, answers and changes of mode in the order of time; the oldest are forgotten."""
 
     def __init__(self) -> None:
-        self._commands: deque[tuple[float, int, Frame]] = deque(maxlen=_REMEMBERED)
+        self._commands: deque[CommandEvent] = deque(maxlen=_REMEMBERED)
         self._replies: deque[tuple[float, int, bytes]] = deque(maxlen=_REMEMBERED)
         self.changes: deque[ModeChange] = deque(maxlen=_REMEMBERED)
         self._modes = [DriveMode.STOPPED, DriveMode.STOPPED]
 
-    def record_command(self, time: float, joint: int, command: Frame) -> None:
-        """Note what the host sent to a drive."""
-        self._commands.append((time, joint, command))
+    def record_command(self, time: float, joint: int, message: bus.Message) -> None:
+        """Note what the host sent to a drive, if it wrote the drive's mode."""
+        written = {s.register: s.value or 0.0 for s in message.writes}
+        if written.get(Register.MODE) in mode_machine.MODES:
+            mode = DriveMode(int(written[Register.MODE]))
+            torque = float(written.get(Register.COMMAND_FEEDFORWARD_TORQUE, 0.0))
+            most = float(written.get(Register.COMMAND_POSITION_MAX_TORQUE, 0.0))
+            self._commands.append(CommandEvent(time, joint, mode, torque, most))
 
     def record_reply(self, time: float, joint: int, answer: Frame) -> None:
         """Note a drive's answer."""
         self._replies.append((time, joint, answer.data))
 
     @property
-    def commands(self) -> list[CommandEvent]:
+    def commands(self) -> Sequence[CommandEvent]:
         """The commands that wrote a drive's mode."""
-        found = []
-        for time, joint, frame in self._commands:
-            written = {s.register: s.value or 0.0 for s in bus.Message.read(frame).writes}
-            if written.get(Register.MODE) in mode_machine.MODES:
-                mode = DriveMode(int(written[Register.MODE]))
-                torque = float(written.get(Register.COMMAND_FEEDFORWARD_TORQUE, 0.0))
-                most = float(written.get(Register.COMMAND_POSITION_MAX_TORQUE, 0.0))
-                found.append(CommandEvent(time, joint, mode, torque, most))
-        return found
+        return self._commands
 
-    @property
-    def answers(self) -> list[ReplyEvent]:
-        """The answers that told a drive's state."""
-        read = ((time, joint, parse_reply(data)) for time, joint, data in self._replies)
-        return [
-            ReplyEvent(
-                time,
-                joint,
-                DriveMode(int(values[Register.MODE])),
-                int(values[Register.FAULT]),
-                values[Register.VOLTAGE],
-                values[Register.TEMPERATURE],
-            )
-            for time, joint, values in read
-            if values.keys() >= set(_TOLD)
-        ]
+    def answers(self, since: float = 0.0) -> Iterator[ReplyEvent]:
+        """Yield the answers that told a drive's state, from a time on, s."""
+        for time, joint, data in self._replies:
+            if time < since:
+                continue
+            values = parse_reply(data)
+            if values.keys() >= set(_TOLD):
+                yield ReplyEvent(
+                    time,
+                    joint,
+                    DriveMode(int(values[Register.MODE])),
+                    int(values[Register.FAULT]),
+                    values[Register.VOLTAGE],
+                    values[Register.TEMPERATURE],
+                )
 
     def record_mode(self, time: float, joint: int, drive: EmulatedDrive) -> None:
         """Note a drive's mode after a step, if it is another."""
