@@ -18,6 +18,7 @@ import jinja2
 
 sys.path.insert(0, str(Path(__file__).parent.parent))  # for the studies, which are not installed
 import macros_live
+import macros_notebooks
 import macros_package
 import macros_results
 from mkdocs.exceptions import PluginError
@@ -52,11 +53,11 @@ MACROS = {
 
 
 def on_files(files: Files, config: Any) -> Files:  # noqa: ANN401
-    """Put results of the studies and the live page beside the pages (called by mkdocs)."""
+    """Put results of the studies, notebooks and the live page beside the pages (for mkdocs)."""
     for path in sorted([*ROOT.glob("studies/*/results/*"), *ROOT.glob("studies/*/figures/*")]):
         address = f"results/{path.parts[-3]}/{path.name}"
         files.append(File.generated(config, address, abs_src_path=str(path)))
-    for address, content in macros_live.pages().items():
+    for address, content in (macros_live.pages() | macros_notebooks.pages()).items():
         files.append(File.generated(config, address, content=content))
     return files
 

@@ -7,13 +7,17 @@ import contextlib
 import dataclasses
 import importlib
 import json
+import math
 from dataclasses import astuple
 from pathlib import Path
+from statistics import mean
 from typing import Any
 
 from mkdocs.exceptions import PluginError
 
 from hopping_leg import figure_style
+from hopping_leg.cli.demo import BEST
+from hopping_leg.controllers.registry import ENERGY_SHAPING
 from hopping_leg.evaluate.acceptance import HIGHEST, LEAST_FLIGHT, LOWER, accuracies
 
 STUDIES = Path(__file__).parent.parent / "studies"
@@ -222,7 +226,7 @@ def training(recipe: str) -> str:
     columns = [Column.parse(title) for title in titles]
     cells = [[column.cell(row) for column in columns] for row in rows]
     shown = cells if len(cells) <= _MOST_POINTS else cells[-1:]
-    lines = curve(file, "rows", "mean_abs_median_error_m", "mean |error|, mm", recipe=recipe)
+    lines = curve(file, "rows", "mean_abs_median_error_m", "mean |error| / mm", recipe=recipe)
     return f"{grid([column.title for column in columns], shown)}\n\n{lines}{origin(file)}"
 
 
@@ -251,7 +255,8 @@ def curve(file: str, path: str, key: str, axis: str, **where: Any) -> str:  # no
             color=figure_style.colour(index),
             label=f"seed {seed}",
         )
-    axes.set(yscale="log", xlabel="wall-clock time, min", ylabel=axis)
+    figure_style.plain_log(axes, "y")
+    axes.set(xlabel="wall-clock time / min", ylabel=axis)
     axes.legend()
     svg = figure_style.to_svg(figure).decode()
     return svg[svg.index("<svg") :].replace("\n", "") + "\n"
@@ -342,6 +347,59 @@ def precision(file: str, high: float = 1.0) -> str:
     return grid(titles, rows) + origin(file)
 
 
+def front() -> str:
+    """Return what a newcomer sees first: the legs, two commands, how well they hop."""
+    seen, trained = "speed/view.json", "time_to_accuracy/distillation.json"
+    training = _rows(trained, "summary", {"recipe": "fast"})[-1]
+    command = "hop train --recipe fast --out runs/fast"
+    soon = value(seen, "start_s", digits=0)
+    return f"""\
+![Two legs follow a staircase of commanded heights](results/evaluation/staircase.webp)
+
+A learned policy, `{BEST}`, beside `{ENERGY_SHAPING}`, the classical controller.
+Made by `python -m studies.evaluation.staircase`.
+
+On Debian with Python 3.11 (and its `venv`), make and git:
+
+```bash
+make install
+. .venv/bin/activate
+{"hop demo":{len(command)}}   # both hop in your browser after {soon} s; the first start compiles
+{command}   # a policy of your own after {training["seconds"]:.0f} s
+```
+
+Times are those of {value(seen, "host.cores")} cores, from [`{seen}`](results/{seen}) and
+[`{trained}`](results/{trained}).
+
+{headline()}"""
+
+
+def headline() -> str:
+    """Return how accurate controllers are, at worst, and on ground that they are not told of."""
+    precise, robust = "evaluation/precise.json", "evaluation/robustness.json"
+    tried = read(robust)["conditions"]
+    rows = []
+    for name, hops in accuracies(read(precise)["summary"], math.inf).items():
+        elsewhere = [
+            row["score"]
+            for row in _rows(robust, "scores", {"controller": name})
+            if row["axis"].startswith("ground-")
+        ]
+        lengths = (hops.mean_error_m, hops.worst_error_m, hops.mean_std_m)
+        shares = f"{100 * mean(elsewhere):.0f} %"
+        rows.append(
+            [f"`{name}`", *(f"{1e3 * m:.1f}" for m in lengths), str(hops.skipped_hops), shares]
+        )
+    heights = len({row["command_m"] for row in read(precise)["summary"]})
+    titles = ["controller", f"error, mm, mean of {heights} heights", "at the worst height"]
+    titles += ["std, mm", "skipped hops"]
+    titles += [f"other ground: trials within {1e3 * tried['tolerance_m']:.0f} mm"]
+    return (
+        f"{grid(titles, rows)}\n\nIn simulation, with the paper's noise and delay. From"
+        f" [`{precise}`](results/{precise}) and [`{robust}`](results/{robust}).\n"
+    )
+
+
 def against(file: str, rival: str) -> str:
     """Return at how many commands controllers beat a rival: a row per controller.
 
@@ -414,6 +472,12 @@ def _p(value: float) -> str:
     return "< 0.001" if value < 1e-3 else f"= {value:.3f}"
 
 
+def heading(study: str) -> str:
+    """Return the heading of a study's README."""
+    text = (STUDIES / study / "README.md").read_text(encoding="utf-8")
+    return text.partition("\n")[0].removeprefix("# ")
+
+
 def pictures(study: str) -> list[str]:
     """Return the names of a study's figures."""
     return sorted(path.name for path in (STUDIES / study / "figures").glob("*.svg"))
@@ -444,6 +508,8 @@ MACROS = {
     "commands": commands(),
     "curve": curve,
     "entries": entries,
+    "front": front,
+    "heading": heading,
     "latest": latest,
     "limits": limits,
     "not_certified": not_certified,

@@ -13,6 +13,7 @@ PAGES = {
 }
 
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+_NO_PROSE = re.compile(r"^```.*?^```$|\{\{.*?\}\}|\{%.*?%\}|<!--.*?-->", re.DOTALL | re.MULTILINE)
 _INLINE = re.compile(r"(?<!`)`(hop [^`]+)`(?!`)")
 _INDENTED = re.compile(r"^ {4,}(hop|python|make|pip) .*$", re.MULTILINE)
 
@@ -44,6 +45,14 @@ def blocks(page: str) -> list[Block]:
         Block(found[1], found[2], f"{name}:{text.count(chr(10), 0, found.start()) + 1}")
         for found in _BLOCK.finditer(text)
     ]
+
+
+def prose(page: str) -> list[str]:
+    """Return a page's headings, paragraphs, entries of lists and cells of tables as plain text."""
+    text = _NO_PROSE.sub("", PAGES[page].read_text(encoding="utf-8"))
+    text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", text)
+    parts = re.split(r"\n\s*\n|\n(?=[-|#:]|\d\.)|\|", text)
+    return [part for part in parts if re.search(r"\w", part)]
 
 
 def inline_commands(page: str) -> list[list[str]]:

@@ -18,6 +18,7 @@ from tests.doc_pages import ROOT, blocks
 from tests.evaluate.test_comparison import TRAINING
 
 SHORTER = {
+    "hop demo": {"--no-browser": None, "--port": "0", "--seconds": "0.5"},
     "hop deploy": {"--seconds": "0.3", "--yes": None},
     "hop doctor --home": {"--yes": None},
     "hop doctor --write": {"--yes": None},
@@ -107,6 +108,7 @@ def furnish(page: str) -> None:
     Path("runs/deploy").mkdir(parents=True)
     make = {
         "deploy": _wired_leg_and_killed_run,
+        "first-controller": _first_controller,
         "evaluation": _stored_runs,
         "other-tools": _bag_and_policy,
         "own-controller": lambda: _trial().save(Path(TRIAL)),
@@ -115,6 +117,12 @@ def furnish(page: str) -> None:
         "viewer": _trial_and_killed_run,
     }
     make.get(page, lambda: None)()
+
+
+def _first_controller() -> None:
+    """Write what the page lets the reader write."""
+    code = [b.text for b in blocks("first-controller") if b.language == "python"]
+    Path("first.py").write_text("\n\n".join(code))
 
 
 def _trained_policy() -> None:

@@ -54,10 +54,10 @@ def test_what_a_command_reads_an_earlier_one_has_made(name):
         made += written
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_tables_of_a_readme_are_those_of_its_stored_results(name):
+@pytest.mark.parametrize("name", [readmes.PROJECT, *NAMES])
+def test_numbers_of_a_readme_are_those_of_its_stored_results(name):
     pytest.importorskip("mkdocs", reason="the extra 'docs' is not installed")
-    assert readmes.filled(name) == (ROOT / "studies" / name / "README.md").read_text()
+    assert readmes.filled(name) == readmes.readme(name).read_text()
 
 
 def test_results_are_small():

@@ -16,11 +16,11 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from hopping_leg.colours import COLOURS
+from hopping_leg.colours import controller_colours
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.evaluate.runner import software_versions
-from hopping_leg.figure_style import panels, styled, to_svg
+from hopping_leg.figure_style import panels, plain_log, styled, to_svg
 from hopping_leg.io import write_atomically
 from hopping_leg.rl.policy_evaluation import CommandResult, evaluate_policy
 from hopping_leg.rl.recipes import RECIPES
@@ -193,10 +193,10 @@ def _mean_spent(spent: list[Row]) -> list[Row]:
 def draw(rows: list[Row]) -> Figure:
     """Draw error and scatter over time, a line per seed; what does not hop has no scatter."""
     figure, axes = panels(2)
-    names = list(dict.fromkeys(row["recipe"] for row in rows))
+    colours = controller_colours(row["recipe"] for row in rows)
     keys = ("mean_abs_median_error_m", "mean_std_m")
-    for (axis,), key, title in zip(axes, keys, ("mean |error|, mm", "mean std, mm"), strict=True):
-        for name, colour in zip(names, COLOURS, strict=False):
+    for (axis,), key, title in zip(axes, keys, ("mean |error| / mm", "mean std / mm"), strict=True):
+        for name, colour in colours.items():
             own = [row for row in rows if row["recipe"] == name]
             for number, seed in enumerate(dict.fromkeys(row["seed"] for row in own)):
                 line = [row for row in own if row["seed"] == seed]
@@ -204,9 +204,10 @@ def draw(rows: list[Row]) -> Figure:
                 seconds = [row["seconds"] for row in line]
                 shown = [1e3 * row[key] or np.nan for row in line]
                 axis.plot(seconds, shown, ".-", color=colour, lw=0.8, label=label)
-        axis.set(xscale="log", yscale="log", ylabel=title)
-    axes[0][0].legend(ncol=len(names))
-    axes[-1][0].set_xlabel("wall-clock time, s")
+        plain_log(axis, "x", "y")
+        axis.set_ylabel(title)
+    axes[0][0].legend(ncol=len(colours))
+    axes[-1][0].set_xlabel("wall-clock time / s")
     return figure
 
 
