@@ -36,9 +36,14 @@ def test_the_page_tells_the_height_and_its_button_stops_the_leg(running):
     assert stops == ["stop"]
 
 
-@pytest.mark.parametrize(
-    ("asked", "given"), [(0.35, 0.35), (9, 0.40), (-1.0, 0.22), (float("nan"), 0.30)]
-)
+@pytest.mark.parametrize("body", [b"", b"[", b"{}", b'"x"', b"\xff"])
+def test_a_stop_stops_whatever_it_says(running, body):
+    page, _, stops = running
+    urllib.request.urlopen(page.address + "/stop", body, timeout=5).close()
+    assert stops == ["stop"]
+
+
+@pytest.mark.parametrize(("asked", "given"), [(0.35, 0.35), (9, 0.40), (-1.0, 0.22)])
 def test_the_slider_moves_the_height_within_its_range(running, asked, given):
     page, height, _ = running
     state = json.loads(ask(page, "/height", {"height": asked}))
@@ -52,6 +57,8 @@ def test_the_slider_moves_the_height_within_its_range(running, asked, given):
         ("/height", {"height": 0.35}, {"Host": "elsewhere.example"}, 403),
         ("/height", {"height": "high"}, {}, 400),
         ("/height", {"height": True}, {}, 400),
+        ("/height", {"height": float("inf")}, {}, 400),
+        ("/height", {"height": float("nan")}, {}, 400),
         ("/height", [0.35], {}, 400),
         ("/height.json", None, {}, 404),
     ],

@@ -2,10 +2,10 @@
 
 import contextlib
 import json
+import math
 import threading
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any
 
 from hopping_leg.deploy.keyboard import LiveHeight
 from hopping_leg.errors import UsageError
@@ -88,20 +88,22 @@ class HeightPage:
         """Give the port back."""
         self._server.server_close()
 
-    def _act(self, path: str, asked: dict[str, Any]) -> bool:
-        """Do what a request asks for; return whether it could."""
+    def _act(self, path: str, asked: object) -> bool:
+        """Do what a request asks for; return whether it could. A stop stops, whatever it says."""
         if path == "/stop" and self._stop is not None:
             self._stopping = True
             self._stop()
             return True
-        wanted = asked.get("height")
+        wanted = asked.get("height") if isinstance(asked, dict) else None
         if path != "/height" or isinstance(wanted, bool) or not isinstance(wanted, int | float):
             return False
         try:
-            self._height.set(float(wanted))
+            height = float(wanted)
         except OverflowError:
             return False
-        return True
+        if finite := math.isfinite(height):
+            self._height.set(height)
+        return finite
 
     def _state(self) -> bytes:
         low, high = self._height.valid
@@ -134,7 +136,7 @@ class HeightPage:
                     length = int(self.headers.get("Content-Length", "0"))
                     if 0 <= length <= _LONGEST:
                         asked = json.loads(self.rfile.read(length) or b"{}")
-                done = isinstance(asked, dict) and page._act(self.path, asked)
+                done = page._act(self.path, asked)
                 self._answer(200 if done else 400, page._state(), "application/json")
 
             def _own(self) -> bool:

@@ -44,9 +44,12 @@ class Access:
             return "This page is served to this computer alone."
         if (origin or upgrade) and urlsplit(origin).netloc != host:
             return "Another page may not use this one."
-        if self.token and not any(hmac.compare_digest(t, self.token) for t in _tokens(request)):
+        if self.token and not any(self._fits(word) for word in _tokens(request)):
             return "Open the address that `hop view` printed, with its token."
         return ""
+
+    def _fits(self, word: str) -> bool:
+        return hmac.compare_digest(word.encode(errors="replace"), self.token.encode())
 
     def answer(
         self,
