@@ -141,7 +141,7 @@ def doubts_of_values(robot: Robot, stated: Tree, origin: str) -> Iterator[str]:
         reach = link.reach + below - link.com
         most = _CROSSWAYS * link.mass * (link.com + above) * reach
         least = link.mass * (_LEAST_GYRATION * link.length) ** 2
-        if not least <= link.inertia <= most:
+        if least < most and not least <= link.inertia <= most:
             radius = math.sqrt(link.inertia / link.mass)
             yield (
                 f"{origin}: '{name}.inertia' is {link.inertia:g} kg m2, a radius of gyration of"
