@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hopping_leg import io
+from hopping_leg import io, parquet
 from hopping_leg.errors import RobotError, TraceError, UsageError
 from hopping_leg.io import write_atomically
 from hopping_leg.trace import COLUMNS, Trace
@@ -140,6 +140,26 @@ def test_missing_and_foreign_files_are_refused(tmp_path):
     pl.DataFrame({"a": [1]}).write_parquet(foreign, metadata={"hopping_leg": '{"schema": 0}'})
     with pytest.raises(TraceError, match="schema 0"):
         Trace.load(foreign)
+
+
+@pytest.mark.parametrize(
+    ("values", "tried"),
+    [(pl.zeros(1 << 16, eager=True), False), (pl.zeros(1 << 18, eager=True), True)]
+    + [(pl.Series([value]), True) for value in ("text", [0.0])],
+)
+def test_a_whole_file_that_may_hold_too_much_is_read_elsewhere_first(
+    tmp_path, monkeypatch, values, tried
+):
+    monkeypatch.setattr(parquet, "MOST_MEMORY", 1 << 20)
+    monkeypatch.setattr(parquet, "_try", lambda _: "it takes more than a MiB")
+    path = tmp_path / "run.parquet"
+    Trace(pl.DataFrame({"a": values})).save(path)
+    assert path.stat().st_size < 1 << 15
+    if tried:
+        with pytest.raises(TraceError, match="takes more than a MiB"):
+            Trace.load(path)
+    else:
+        Trace.load(path)
 
 
 def test_a_failed_write_leaves_the_old_file_whole(tmp_path):
