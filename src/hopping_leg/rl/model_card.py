@@ -26,9 +26,10 @@ def render(result: dict[str, Any]) -> str:
     versions = ", ".join(f"{name} {number}" for name, number in result["versions"].items())
     name = result["robot"]
     robot = f"`{name}`" if name in shipped_robots() else f"{name}, `{ROBOT_FILE}` in this folder"
+    legs = "any leg of this kind;\nthe trials below are on" if _any(result) else "robot"
     return f"""# Policy `{result["recipe"]}`, seed {result["seed"]}
 
-One network from joint measurements to joint torques, for robot {robot}
+One network from joint measurements to joint torques, for {legs} {robot}
 (parameters {result["robot_digest"]}), commands {commands[0]:g} to {commands[1]:g} m,
 {task["rate"]:g} Hz. Made by
 
@@ -46,6 +47,10 @@ step {1000 * TIMESTEP:g} ms, the first 2 s of each trial dropped. These seeds ch
 
 {table(selected["trials"])}
 {missed_commands(selected["trials"])}"""
+
+
+def _any(result: dict[str, Any]) -> bool:
+    return bool(result["options"]["legs"] == "any")
 
 
 def stages(rows: list[dict[str, Any]]) -> str:
