@@ -180,3 +180,18 @@ def test_command_out_of_range_is_refused(command, count):
     m.command[-1, 0] = command
     with pytest.raises(UsageError, match=r"0\.22 to 0\.4 m"):
         loaded(network(), count).act(m)
+
+
+def test_a_policy_for_any_leg_asks_which_and_acts_in_its_units():
+    policy, big = load_policy("universal"), load_robot("legv1")
+    policy.reset(1)
+    with pytest.raises(UsageError, match="set_robot"):
+        policy.act(measurement(1))
+    shown, torques = measurement(1), []
+    for robot in (load_robot("legv2"), big):
+        policy.set_robot(robot)
+        policy.reset(1)
+        low, _high = policy.command_range
+        torques.append(policy.act(dataclasses.replace(shown, command=np.full((1, 3), low))))
+    assert policy.command_range == pytest.approx(np.array([0.7, 1.4]) * big.straight_height)
+    assert np.abs(torques[0] - torques[1]).max() > 0.1

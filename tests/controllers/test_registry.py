@@ -51,7 +51,14 @@ def test_the_first_policy_decides(made_on):
 
 @pytest.mark.parametrize(
     "controllers",
-    [[], ["energy-shaping"], ["mpc-true-state"], ["nobody"], ["missing.onnx", "my.toml"]],
+    [
+        [],
+        ["energy-shaping"],
+        ["universal"],
+        ["mpc-true-state"],
+        ["nobody"],
+        ["missing.onnx", "my.toml"],
+    ],
 )
 def test_who_was_not_trained_hops_on_the_default_robot(controllers):
     assert robot_of(controllers) == DEFAULT_ROBOT

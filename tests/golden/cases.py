@@ -92,6 +92,7 @@ def policies(folder: Path) -> Values:
     result = []
     for name in shipped_policies():
         policy = load_policy(name)
+        policy.set_robot(load_robot("legv2-paper"))
         policy.reset(3)
         result.append(np.array([policy.act(measurement) for measurement in seen]))
     return result

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from hopping_leg.cli import view
 from hopping_leg.controllers.registry import ENERGY_SHAPING
 
-BEST = "precise"
-"""The shipped policy that hops most accurately."""
+BEST = "universal"
+"""The shipped policy that hops on any leg, changed ones included."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from hopping_leg.arrays import Array, Array32, IntArray
 from hopping_leg.controllers import robot_numbers
 from hopping_leg.controllers.sample_history import RingBuffer, SampleHistory
-from hopping_leg.errors import PolicyError, unknown_name
+from hopping_leg.errors import PolicyError, UsageError, unknown_name
 from hopping_leg.robot import Robot
 from hopping_leg.sim.channel import DELAY_DEPTH, SAMPLES, Measurement
 
@@ -235,6 +235,8 @@ class AnyLeg(Dated):
         """All but the full torque."""
         return tuple(name for name in self.shapes if name != FULL_TORQUE)
 
+    _numbers: Array | None = None
+
     def set_robots(self, robots: Sequence[Robot]) -> None:
         """Say what is believed of the legs."""
         self._numbers = np.array([robot_numbers.robot_numbers(robot) for robot in robots])
@@ -246,7 +248,15 @@ class AnyLeg(Dated):
         self._time = np.array([[[robot_numbers.fall_time(robot)]] for robot in robots])
 
     def inputs(self) -> Inputs:
-        """Return samples, torques and command in the leg's units, and the leg's numbers."""
+        """Return samples, torques and command in the leg's units, and the leg's numbers.
+
+        Raises:
+            UsageError: It does not know which leg it is on.
+        """
+        if self._numbers is None:
+            raise UsageError(
+                "A policy for any leg does not know which it is on; tell it with `set_robot`."
+            )
         seen, count = super().inputs(), len(self._command)
         foot, velocity = self._foot_motion(seen["q"], seen["qd"])
         height = (self._command[:, None] - self._foot) / self._length
