@@ -114,7 +114,9 @@ class Design:
 
     @cached_property
     def _time(self) -> Array:
-        return np.arange(round(self.period * self.rate)) / self.rate
+        """Of a period and the fade before it: all that the excitation asks of the leg, s."""
+        seconds = min(self.period + _FADE, self.duration)
+        return np.arange(round(seconds * self.rate)) / self.rate
 
     @cached_property
     def tones(self) -> Array:
@@ -192,7 +194,9 @@ class Design:
             slopes, noisy = np.concatenate([slopes, air]), [*noisy, _AIR_ERROR * air]
         together = np.concatenate(noisy)
         inverse = np.linalg.pinv(slopes.T @ slopes, hermitian=True)
-        errors = np.linalg.norm(together @ inverse, axis=0) * np.sqrt(self.period / self.duration)
+        errors = np.linalg.norm(together @ inverse, axis=0) * np.sqrt(
+            self._time[-1] / self.duration
+        )
         return dict(zip(plan.parameters.parameters, errors * plan.parameters.scale, strict=True))
 
     @property
@@ -225,7 +229,7 @@ class Design:
         return found
 
     def _tracked(self, harmonics: Harmonics) -> Recording | None:
-        """Return what a PD makes of a period; None where the leg comes too near its limits."""
+        """Return what a PD makes of it; None where the leg comes too near its limits."""
         target = harmonics.joints(self.robot, self._time)
         pairs = {"position": target, "position_command": target}
         if self.track_velocity:
