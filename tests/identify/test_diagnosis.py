@@ -8,11 +8,12 @@ import pytest
 from hopping_leg.cli import main
 from hopping_leg.identify import excitation, paper_excitation, play_excitation
 from hopping_leg.identify.diagnosis import diagnose
-from hopping_leg.robot import load_robot
+from hopping_leg.robot import SensorMismatch, load_robot
 from hopping_leg.sim.randomization import draw_twin
-from tests.identify.twin import changed
+from tests.identify.twin import LEG, STEP, changed, record, swing
 
 BELIEVED, SEED = load_robot("legv2"), 8102
+NOISY = SensorMismatch(velocity_noise=1.0)
 
 
 @cache
@@ -40,6 +41,15 @@ def turned(by):
     return shifted(hip_position_rad=by, hip_position_command_rad=by)
 
 
+def rubbing(at=None):
+    """Return a leg whose knee rubs around an angle, rad, or nowhere."""
+
+    def rubs(q):
+        return np.array([0.0, 0.0 if at is None else 0.4 * np.exp(-(((q[1] - at) / 0.3) ** 2))])
+
+    return record(LEG, swing(16.0), rubs=rubs, fine=STEP)
+
+
 def lossy():
     """Return the healthy twin's recording without every twentieth position."""
     position = pl.when(pl.int_range(pl.len()) % 20 > 0).then(pl.col("hip_position_rad"))
@@ -55,13 +65,17 @@ def lossy():
         (lambda: shifted(knee_torque_nm=-0.2), "offset", "knee", -0.2),
         (lambda: turned(0.25), "zero", "hip", 0.25),
         (lossy, "dropouts", "", 0.05),
+        (lambda: played(("hip", "sensor", NOISY)), "noise", "hip", 1.0),
+        (lambda: played(("hip", "backlash", 0.03)), "backlash", "hip", 5.7),
+        (lambda: rubbing(-1.0), "rubbing", "knee", 0.35),
     ],
 )
 def test_what_is_wrong_is_named_with_its_number_and_nothing_else(make, kind, joint, value):
     (found,) = diagnose(make(), BELIEVED)
     assert (found.kind, found.joint) == (kind, joint)
     assert abs(found.value - value) < max(3 * found.deviation, 0.2 * abs(value))
-    assert found.sentence.startswith((f"The {joint}'s", "By its gravity", "5 %"))
+    starts = (f"The {joint}'s", f"The {joint} trembles", "By its gravity", "5 %", "Around")
+    assert found.sentence.startswith(starts)
 
 
 def test_commands_that_act_late_are_named():
@@ -72,6 +86,7 @@ def test_commands_that_act_late_are_named():
 
 def test_nothing_is_said_of_a_healthy_leg_or_without_torques(tmp_path, capsys):
     assert diagnose(played(), BELIEVED) == []
+    assert diagnose(rubbing(), BELIEVED) == []
     torques = {"hip_torque_nm": pl.lit(np.nan), "knee_torque_nm": pl.lit(np.nan)}
     assert diagnose(changed(shifted(hip_torque_nm=0.2), **torques), BELIEVED) == []
     path, numbers = tmp_path / "run.parquet", tmp_path / "findings.json"

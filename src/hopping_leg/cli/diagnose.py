@@ -1,8 +1,9 @@
 """Say in plain words what is wrong with a leg, as far as its recordings tell.
 
 Told are a motor that gives too little, offsets of torque, commands that act late, the hip's zero,
-friction that differs by direction, and lost measurements, each with its interval and what to do. A
-clamped leg tells most. Backlash, soft belts and friction that varies with the angle are not told.
+friction that differs by direction or is higher at some angle, play that makes a motor tremble,
+noise, and lost measurements, each with what to do. A clamped leg tells most. A knee's play does not
+show, as its shank weighs little beside its motor, nor do soft belts.
 
 Examples:
   hop diagnose fixed-base.parquet

@@ -2,7 +2,9 @@
 
 A stated PD says what torque every row asks for; measured torques regressed on it tell the motor's
 gain, a constant offset and how late commands act. The balance of momentum of a clamped leg tells
-where angles are zero, and torque that is always there though no motor gives it.
+where angles are zero, torque that is always there though no motor gives it, and at which angles a
+joint rubs. Where a motor has play it trembles about what it is asked for, which positions and
+velocities show alike, unlike noise.
 """
 
 from collections.abc import Iterator
@@ -12,6 +14,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.identify.identifiability import correlation_time
+from hopping_leg.identify.initial_states import full_states
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.torque_balance import Balance
 from hopping_leg.identify.validation import as_torque_driven
@@ -22,6 +25,11 @@ _SURE = 3.0  # deviations from which on a number counts
 _LEAST = 200  # rows that a regression needs
 _WEAK, _OFFSET, _ZERO = 0.85, 0.06, 0.03  # gain, N m and rad, beyond which something is wrong
 _PULL = 0.12  # N m, more than friction that sticks passes for in healthy legs
+_PLACES, _RUBS = 6, 0.12  # angles at which friction is told apart, and N m, likewise
+_RANGE, _DRAG = (0.02, 0.98), 0.05  # of the angles' quantiles, and rad/s at which friction is there
+_TREMBLES, _NOISE = 1.0, 0.6  # rad/s
+_SIZE = 1.4826  # a normal number's standard deviation over its median size
+_PRODUCT = 0.455  # median of a normal number's square over its variance
 _LATE = 6e-3  # s
 _LOST = 0.01  # share of rows without a measurement
 _WITHIN = 0.6  # share of what a motor can give at its speed, below which even a weak one follows
@@ -33,7 +41,8 @@ class Finding:
     """One thing that is wrong."""
 
     kind: str
-    """``gain``, ``offset``, ``delay``, ``zero``, ``one-sided`` or ``dropouts``."""
+    """``gain``, ``offset``, ``delay``, ``zero``, ``one-sided``, ``rubbing``, ``backlash``,
+    ``noise`` or ``dropouts``."""
     joint: str
     """Empty if it concerns both."""
     value: float
@@ -46,7 +55,7 @@ class Finding:
 
 def diagnose(recording: Recording, robot: Robot) -> list[Finding]:
     """Return what is surely wrong with the leg of a recording; nothing where it cannot tell."""
-    found = list(_dropouts(recording))
+    found = [*_dropouts(recording), *_scatter(recording)]
     drives = [finding for joint in range(2) for finding in _drive(recording, robot, joint)]
     late = [finding for finding in drives if finding.kind == "delay"]
     found += [finding for finding in drives if finding.kind != "delay"]
@@ -65,6 +74,34 @@ def _dropouts(recording: Recording) -> Iterator[Finding]:
             f"{100 * lost:.2g} % of the rows have no measured position; check bus, plugs and the"
             " cycle time.",
         )  # fmt: skip
+
+
+def _scatter(recording: Recording) -> Iterator[Finding]:
+    """Yield joints that tremble, and velocities that are not those that positions went by."""
+    q, qd, time = recording.array("position"), recording.array("velocity"), recording.time
+    went = (q[2:] - q[:-2]) / (time[2:] - time[:-2])[:, None]
+    seen = (qd[2:] + 4 * qd[1:-1] + qd[:-2]) / 6
+    # What both sensors show from row to row is motion; third differences leave no swing.
+    both = np.diff(went, 3, axis=0) * np.diff(qd[1:-1], 3, axis=0)
+    for joint, name in enumerate(JOINTS):
+        apart = np.abs(went - seen)[:, joint]
+        apart, shaken = (x[np.isfinite(x)] for x in (apart, both[:, joint]))
+        if len(shaken) < _LEAST:
+            continue
+        tremble = float(np.sqrt(max(np.median(shaken) / _PRODUCT / 20, 0.0)))
+        noise = float(np.median(apart)) * _SIZE * np.sqrt(2)
+        if tremble > _TREMBLES:
+            yield Finding(
+                "backlash", name, tremble, tremble * float(np.sqrt(2 / len(shaken))),
+                f"The {name} trembles by {tremble:.2g} rad/s from row to row; look for play in its"
+                " gear, pulleys and screws, or for gains that are too high.",
+            )  # fmt: skip
+        elif noise > _NOISE:
+            yield Finding(
+                "noise", name, noise, noise * float(np.sqrt(2 / len(apart))),
+                f"The {name}'s velocity scatters by {noise:.2g} rad/s about what its positions went"
+                " by; check its encoder's magnet, its cable and the drive's filter.",
+            )  # fmt: skip
 
 
 def _drive(recording: Recording, robot: Robot, joint: int) -> Iterator[Finding]:
@@ -149,6 +186,7 @@ def _balance(recording: Recording, shifts: list[float]) -> Iterator[Finding]:
                 f" {'forwards' if pull > 0 else 'backwards'} than the other way; look for a cable"
                 " that pulls and for friction that differs by direction.",
             )  # fmt: skip
+    yield from _rubbing(recording)
     down, across = found.values[4], found.values[6]
     zero = float(np.arctan2(-across, down))
     deviation = float(found.errors[6]) / max(abs(float(down)), 1e-9)
@@ -158,3 +196,29 @@ def _balance(recording: Recording, shifts: list[float]) -> Iterator[Finding]:
             f"By its gravity the leg hangs down where the hip is {zero:.2g} +- {2 * deviation:.1g}"
             " rad; set the encoder's zero anew.",
         )  # fmt: skip
+
+
+def _rubbing(recording: Recording) -> Iterator[Finding]:
+    """Yield at which angle a joint's friction is higher than at all others."""
+    (q1, q2), speeds = (values.T for values in full_states(recording))
+    low, high = np.quantile([q1, q2], _RANGE, axis=1)
+    places = np.linspace(low, high, _PLACES).T
+    further = [
+        (joint, np.interp(angle, places[joint], here) * np.tanh(speed / _DRAG))
+        for joint, (angle, speed) in enumerate(zip((q1, q2), speeds, strict=True))
+        for here in np.eye(_PLACES)
+    ]
+    friction, covariance = Balance(as_torque_driven(recording), biased=True, further=further).found
+    others = np.eye(_PLACES) - (1 - np.eye(_PLACES)) / (_PLACES - 1)
+    for joint, name in enumerate(JOINTS):
+        of_joint = slice(joint * _PLACES, (joint + 1) * _PLACES)
+        more = others @ friction[of_joint]
+        at = int(more.argmax())
+        deviation = float(np.sqrt(others[at] @ covariance[of_joint, of_joint] @ others[at]))
+        if more[at] > max(_RUBS, 1.5 * _SURE * deviation):
+            yield Finding(
+                "rubbing", name, float(more[at]), deviation,
+                f"Around {places[joint, at]:.2g} rad the {name} takes {more[at]:.2g} +-"
+                f" {2 * deviation:.1g} N m more than elsewhere, either way; look for a belt, a"
+                " cable or a bearing that rubs there.",
+            )  # fmt: skip

@@ -13,6 +13,8 @@ positive, the zeros z small, and g b / G2 is the length of the thigh; and with n
 joint may the same balance leave far less unexplained.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from hopping_leg.arrays import Array
@@ -40,7 +42,9 @@ class Balance:
     ``values`` and their deviations ``errors`` are a, b, c, d, G cos z and -G sin z of hip and knee,
     and friction; ``offsets`` and their deviations are torques that are always there, if ``biased``;
     ``unexplained`` is the torques' share that is left. Signs are factors of each joint's angles and
-    torques; ``upright`` takes both zeros for right, ``lever``, s2, b / G2 for known.
+    torques; ``upright`` takes both zeros for right, ``lever``, s2, b / G2 for known. ``further``
+    are torques at joints by number, known but for their factors, a value a row; of these factors
+    ``found`` has the values and their covariance. ``design`` times all values is ``target``.
     """
 
     def __init__(
@@ -52,6 +56,7 @@ class Balance:
         upright: bool = False,
         biased: bool = False,
         lever: float = 0.0,
+        further: Sequence[tuple[int, Array]] = (),
     ) -> None:
         time, step = recording.time, np.diff(recording.time)
         (q1, q2), (w1, w2) = ((values * angles).T for values in full_states(recording))
@@ -87,6 +92,10 @@ class Balance:
                 pairs.append((column[0], column[1]))
         always = mean(np.ones(len(time))) if biased else zero
         pairs += [(always, zero), (zero, always)]
+        for joint, values in further:
+            column = [zero, zero]
+            column[joint] = mean(values)
+            pairs.append((column[0], column[1]))
         design = np.stack([np.concatenate(pair) for pair in pairs], axis=1)
         if upright:
             design[:, 6:8] = 0.0
@@ -104,9 +113,12 @@ class Balance:
         # spans that overlap tell the same again, and so does what the balance does not explain
         alike = [max(float(rows), correlation_time(joint)) for joint in left]
         scaled = design * (weight / np.sqrt(np.repeat(alike, len(zero))))[:, None]
-        deviations = np.diag(np.linalg.pinv(scaled.T @ scaled, hermitian=True))
-        self.errors = np.where(scaled.any(axis=0), np.sqrt(np.maximum(deviations, 0)), np.inf)
-        self.offsets = self.values[-2:], self.errors[-2:]
+        covariance = np.linalg.pinv(scaled.T @ scaled, hermitian=True)
+        deviations = np.sqrt(np.maximum(np.diag(covariance), 0))
+        self.errors = np.where(scaled.any(axis=0), deviations, np.inf)
+        self.offsets = self.values[16:18], self.errors[16:18]
+        self.found = self.values[18:], covariance[18:, 18:]
+        self.design, self.target = design, target
 
 
 def check_balance(recording: Recording, robot: Robot) -> None:
