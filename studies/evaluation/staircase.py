@@ -25,11 +25,11 @@ from hopping_leg.trace import Trace
 
 OUT = Path(__file__).parent / "figures" / "staircase.webp"
 STEP_SECONDS = 2.0
-FRAME_RATE = 20.0
+FRAME_RATE = 50 / 3
 SEED = 1000
 STRIP = 190  # height of the curves, pixels
-WIDTH = 640  # pixels
-QUALITY = 40
+WIDTH = 560  # pixels
+QUALITY = 35
 _DPI = 100
 
 
