@@ -13,6 +13,7 @@ from typing import Any, get_type_hints
 
 import jinja2
 
+from hopping_leg.colours import controller_colours
 from hopping_leg.controllers import registry, robot_numbers
 from hopping_leg.controllers.energy_shaping.gains import (
     FORCES,
@@ -24,7 +25,6 @@ from hopping_leg.controllers.mpc import HopShape
 from hopping_leg.controllers.observation_history import OBSERVATION_HISTORIES, AnyLeg, Dated
 from hopping_leg.controllers.policy import HEIGHT
 from hopping_leg.controllers.rollout import RolloutConfig
-from hopping_leg.figure_style import COLOURS
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.html_page import data_uri
 from hopping_leg.robot import (
@@ -53,7 +53,7 @@ MODULES = sorted(file.stem for file in FOLDER.glob("*.js"))
 CONTROLLERS = (
     "fast", registry.ENERGY_SHAPING, "universal", registry.MPC_TRUE_STATE, "precise", "paper",
 )  # fmt: skip
-"""The first ones have the first colours."""
+"""In the order of the lists; the first two hop first."""
 
 _PACKAGE = resources.files("hopping_leg")
 _COMPUTED = ("armature", "stop_lower", "stop_upper")
@@ -141,8 +141,8 @@ def data(policies: dict[str, str]) -> dict[str, Any]:
         },
         "shape": dataclasses.asdict(HopShape()),
         "controllers": CONTROLLERS,
-        "colours": dict(zip(CONTROLLERS, COLOURS, strict=False)),
-        "other_colours": COLOURS[len(CONTROLLERS) : -1],
+        "colours": controller_colours(CONTROLLERS),
+        "other_colour": controller_colours([*CONTROLLERS, "a visitor's"])["a visitor's"],
         "policies": policies,
     }
 

@@ -35,7 +35,7 @@ function say(text, bad = false) {
 }
 
 function colourOf(name) {
-  return DATA.colours[name] ?? DATA.other_colours[0];
+  return DATA.colours[name] ?? DATA.other_colour;
 }
 
 async function policyBytes(name) {

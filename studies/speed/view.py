@@ -28,7 +28,6 @@ from hopping_leg.cli.options import at_least
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import DEFAULT_ROBOT
-from hopping_leg.viewer import scene
 from hopping_leg.viewer.live_leg import LiveSimulation
 from hopping_leg.viewer.viewer import FRAME_RATE, Viewer
 from studies.shared import host
@@ -141,7 +140,7 @@ def bench_view(benchmark: View, tell: Callable[[str], None] = lambda _: None) ->
         tell("starting `hop view` as a user does")
         start = _start_seconds(browser, benchmark)
         live = _Noting(benchmark.controllers, benchmark.robot, 0.30)
-        viewer = Viewer(live, benchmark.robot, port=0, detail=scene.pixel_ratio())
+        viewer = Viewer(live, benchmark.robot, port=0)
         with running(viewer):
             page = new_page(browser)
             received: list[float] = []
@@ -173,7 +172,6 @@ def bench_view(benchmark: View, tell: Callable[[str], None] = lambda _: None) ->
             "seconds": benchmark.seconds,
             "commands": benchmark.commands,
             "intended_pictures_per_s": FRAME_RATE,
-            "detail": scene.pixel_ratio(),
             "browser": name,
             "viser": version("viser"),
         },
@@ -240,6 +238,7 @@ def _picture(page: "Page", path: Path) -> None:
     """Leave a picture of the page without its notices, in few colours, which makes it small."""
     for close in page.locator(".mantine-Notification-closeButton").all():
         close.click()
+    page.evaluate("window.__viserTestpoints.devSettings.set({ fixedDpr: 1 })")
     page.wait_for_timeout(1000)
     picture, small = Image.open(io.BytesIO(page.screenshot())), io.BytesIO()
     picture.convert("RGB").quantize(_COLOURS).save(small, "PNG", optimize=True)

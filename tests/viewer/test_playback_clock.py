@@ -3,7 +3,6 @@ import math
 import numpy as np
 import pytest
 
-from hopping_leg.viewer import scene
 from hopping_leg.viewer.playback_clock import LONGEST, PlaybackClock
 
 TICK = 0.005
@@ -45,21 +44,3 @@ def test_a_stall_is_not_made_up_for_and_falling_behind_is_told():
     clock.set_speed(1.0)
     assert shown(clock, 20, 0.2) == pytest.approx(20 * LONGEST)
     assert clock.real_time == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize("device", ["dri/renderD128", "nvidia0", "dxg"])
-def test_a_device_that_draws_is_seen_and_other_systems_always_have_one(
-    device, tmp_path, monkeypatch
-):
-    for system in ("darwin", "linux"):
-        monkeypatch.setattr("sys.platform", system)
-        assert scene.has_gpu(tmp_path) == (system == "darwin")
-    (tmp_path / device).parent.mkdir(exist_ok=True)
-    (tmp_path / device).touch()
-    assert scene.has_gpu(tmp_path)
-
-
-@pytest.mark.parametrize(("gpu", "detail"), [(True, None), (False, scene.COARSE)])
-def test_only_a_processor_is_spared_pixels(gpu, detail, monkeypatch):
-    monkeypatch.setattr(scene, "has_gpu", lambda: gpu)
-    assert scene.pixel_ratio() == detail

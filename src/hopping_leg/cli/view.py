@@ -56,8 +56,8 @@ class View:
     port: int = 8080
     """Port to serve at; if it is in use, the next free one."""
     detail: float | None = None
-    """Pixels drawn per pixel of the screen, each way; default: so few that the motion stays smooth
-    where this computer has no GPU, else as many as the browser keeps up with."""
+    """Pixels drawn per pixel of the screen, each way; default: as many as the browser keeps up
+    with."""
     browser: bool = True
     """Whether to open the page where there is a screen."""
     seconds: float = float("inf")
@@ -72,7 +72,6 @@ def run(args: View) -> None:
             " 1 draws every pixel of the screen."
         )
     source = _source(args)
-    from hopping_leg.viewer import scene
     from hopping_leg.viewer.viewer import Viewer
 
     viewer = Viewer(
@@ -80,7 +79,7 @@ def run(args: View) -> None:
         args.robot or robot_of(args.controllers),
         host=args.host,
         port=args.port,
-        detail=scene.pixel_ratio() if args.detail is None else args.detail,
+        detail=args.detail,
     )
     say(f"Open {viewer.address} in a browser; Ctrl-C stops.")
     screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")

@@ -1,9 +1,8 @@
 """The scene: legs as shapes, side by side, the commanded height, the last apex of each."""
 
 import math
-import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import mujoco
@@ -11,13 +10,12 @@ import numpy as np
 import viser
 
 from hopping_leg.arrays import Array
+from hopping_leg.colours import COLOURS, COMMAND, controller_colours, rgb
 from hopping_leg.robot import Robot, build_model
 from hopping_leg.viewer.tracks import Track
 
 Colour = tuple[int, int, int]
 
-COLOURS: tuple[Colour, ...] = ((28, 113, 216), (230, 97, 0))  # of the legs and their curves
-COMMAND: Colour = (38, 162, 105)
 _APART = 0.36  # between legs, m
 _AWAY = 1.2  # of the camera from a single leg, m
 _FIELD_OF_VIEW = math.radians(32)
@@ -32,6 +30,13 @@ _HOUSINGS = ("base", "knee_cap")
 
 _ACROSS = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
 """Turns a cylinder's axis from z to y, that of the joints."""
+
+
+def track_colours(tracks: Sequence[Track]) -> list[str]:
+    """Return the colour of each leg and of its curves: its controller's, if they are different."""
+    names = [track.name for track in tracks]
+    own = controller_colours(names)
+    return list(own.values()) if len(own) == len(names) else list(COLOURS[: len(names)])
 
 
 @dataclass(frozen=True)
@@ -134,7 +139,8 @@ class Scene:
         for drawn in self._drawn:
             drawn.mesh.root.remove()
         self._tracks = tracks
-        self._drawn = [self._add(number, track) for number, track in enumerate(tracks)]
+        shown = zip(tracks, track_colours(tracks), strict=True)
+        self._drawn = [self._add(n, track, rgb(colour)) for n, (track, colour) in enumerate(shown)]
         self._look(len(tracks))
 
     def _look(self, legs: int) -> None:
@@ -147,15 +153,15 @@ class Scene:
             client.camera.position = position
             client.camera.look_at = look_at
 
-    def _add(self, number: int, track: Track) -> _Drawn:
+    def _add(self, number: int, track: Track, colour: Colour) -> _Drawn:
         name = f"/legs/{number}"
-        mesh = add_leg(self._server, name, track.robot, _APART * number, COLOURS[number])
+        mesh = add_leg(self._server, name, track.robot, _APART * number, colour)
         for tenth in range(1, 6):
             self._server.scene.add_label(
                 f"{name}/ruler/label{tenth}",
                 f"{tenth / 10:g}",
                 position=(-0.115, 0.027, tenth / 10),
-                font_screen_scale=0.8,
+                font_screen_scale=1.5,
                 anchor="center-right",
             )
         for tick in range(1, 17):
@@ -169,8 +175,8 @@ class Scene:
             )
         return _Drawn(
             mesh,
-            self._bar(f"{name}/command", COMMAND, 0.003),
-            self._bar(f"{name}/apex", COLOURS[number], 0.002),
+            self._bar(f"{name}/command", rgb(COMMAND), 0.003),
+            self._bar(f"{name}/apex", colour, 0.002),
         )
 
     def _bar(self, name: str, colour: Colour, thick: float) -> viser.BoxHandle:
@@ -216,21 +222,3 @@ def _add_floor(scene: viser.SceneApi) -> None:
         thickness=1.0,
         thickness_units="screen",
     )
-
-
-COARSE = 0.4
-"""Pixels drawn per pixel of the screen, each way, where a processor has to shade them."""
-
-_DEVICES = ("dri/renderD*", "nvidia[0-9]*", "dxg")
-
-
-def has_gpu(devices: Path = Path("/dev")) -> bool:
-    """Tell whether something draws here, as far as Linux lists it; other systems always have it."""
-    if sys.platform != "linux":
-        return True
-    return any(found for pattern in _DEVICES for found in devices.glob(pattern))
-
-
-def pixel_ratio() -> float | None:
-    """Return how many pixels to draw per pixel of the screen, each way; None: the page decides."""
-    return None if has_gpu() else COARSE

@@ -1,15 +1,19 @@
 """The page and the loop behind it: what is asked, what passes, what is shown."""
 
 import contextlib
+import functools
 import html
 import io
 import math
 import socket
 import time
 import urllib.parse
+from importlib import resources
 
 import viser
+from viser import _messages
 
+from hopping_leg.colours import COLOURS, rgb
 from hopping_leg.errors import UsageError
 from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.viewer import access, charts, data_source, live_leg, panels, playback_clock, scene
@@ -18,6 +22,7 @@ FRAME_RATE = 60.0
 _SLOW = 6
 """Pictures per update of each plot and of the text; they take turns."""
 _NOTICE_SECONDS = 8.0
+_RESOLUTION = (resources.files("hopping_leg.viewer") / "resolution.js").read_text(encoding="utf-8")
 _APEX_SECONDS = 3.0
 
 
@@ -30,7 +35,7 @@ class Viewer:
         host: Address of this computer to listen at.
         port: Port to listen at; if it is in use, the next free one.
         detail: Pixels that the page draws per pixel of the screen, each way; None lets it draw as
-            many as it keeps up with, down to three quarters.
+            many as it keeps up with.
 
     Raises:
         UsageError: The page cannot be served there.
@@ -55,10 +60,11 @@ class Viewer:
         self.clock = playback_clock.PlaybackClock(1 / CONTROL_RATE)
         self._queue = panels.GuiQueue()
         gui = self._server.gui
-        gui.configure_theme(show_logo=False, show_share_button=False, brand_color=scene.COLOURS[0])
+        brand = rgb(COLOURS[0])
+        gui.configure_theme(show_logo=False, show_share_button=False, brand_color=brand)
         gui.set_panel_label("Hopping leg")
         gui.main_panel.dock_left()
-        gui.main_panel.set_width(290)
+        gui.main_panel.set_width(310)
         self._status = gui.add_html("")
         self._replay_panel: panels.ReplayPanel | None = None
         if isinstance(source, live_leg.LiveSimulation):
@@ -72,6 +78,7 @@ class Viewer:
         panel.dock_right()
         panel.set_width(390)
         self._scene = scene.Scene(self._server)
+        self._server.on_client_connect(functools.partial(_prepare, adapt=detail is None))
         self.frames = 0
         self._stopped = False
 
@@ -119,11 +126,11 @@ class Viewer:
     def _text(self) -> str:
         """Return what the page says: one line per leg, and the time."""
         source, lines = self._source, []
-        for number, track in enumerate(source.tracks):
+        for track, colour in zip(source.tracks, scene.track_colours(source.tracks), strict=True):
             _, apexes = track.apexes(source.now, _APEX_SECONDS)
             apex = f"{apexes[-1]:.3f} m" if len(apexes) else "none yet"
             lines.append(
-                f'<b style="color:{charts.css(scene.COLOURS[number])}">'
+                f'<b style="color:{colour}">'
                 f'{html.escape(track.name)}</b>: last apex <span class="apex">{apex}</span>'
             )
             if track.note:
@@ -134,6 +141,14 @@ class Viewer:
         keeps = "" if math.isnan(real_time) else f", real time {real_time:.2f}"
         lines.append(f'<span style="color:#77767b">{source.now:.2f} s{keeps}</span>')
         return f'<div style="padding:0.4em 1em;line-height:1.5">{"<br>".join(lines)}</div>'
+
+
+def _prepare(client: viser.ClientHandle, *, adapt: bool) -> None:
+    """Take viser's notice of a slow browser away from the legs, and let resolution adapt to it."""
+    connection = client._websock_connection  # there is no public way to a page
+    connection.queue_message(_messages.RemoveNotificationMessage("webgl-software-rendering"))
+    if adapt:
+        connection.queue_message(_messages.RunJavascriptMessage(_RESOLUTION))
 
 
 def _serve(host: str, port: int) -> tuple[viser.ViserServer, str]:
