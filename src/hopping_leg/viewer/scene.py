@@ -146,7 +146,7 @@ class Scene:
     def _look(self, legs: int) -> None:
         """Turn all cameras, also those of pages that are open, to so many legs."""
         middle = _APART * (legs - 1) / 2
-        look_at, position = (middle, 0.0, 0.25), (middle + 0.12, -_AWAY - 2 * middle, 0.38)
+        look_at, position = (middle, 0.0, 0.25), (middle + 0.12, -_AWAY - 3 * middle, 0.38)
         initial = self._server.initial_camera
         initial.fov, initial.look_at, initial.position = _FIELD_OF_VIEW, look_at, position
         for client in self._server.get_clients().values():
