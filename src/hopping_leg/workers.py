@@ -180,6 +180,8 @@ def _knock(address: str | None) -> None:
 
 
 def _import_ray() -> Any:  # noqa: ANN401
+    # Otherwise a cluster that is started here tells its makers about itself.
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     try:
         import ray
     except ModuleNotFoundError as error:

@@ -16,6 +16,7 @@ import numpy as np
 
 from hopping_leg.cli.options import at_least
 from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.io import write_json
 from hopping_leg.progress import ShareProgress
 
 _HOP = "-m hopping_leg.cli"
@@ -106,7 +107,7 @@ class Kills:
     seed: int = 0
     """Of the moments."""
     folder: Path = Path("runs/kills")
-    """Folder for the runs; what is there is removed."""
+    """Folder for the runs; verbs that are finished there are not killed again."""
     json: Path | None = None
     """Write every number to this file."""
 
@@ -116,13 +117,22 @@ class Kills:
         for name in self.verbs:
             if name not in VERBS:
                 raise UsageError(unknown_name("verb", name, VERBS))
-        shutil.rmtree(self.folder, ignore_errors=True)
-        rows: list[dict[str, Any]] = []
-        for name in self.verbs:
-            rng = np.random.default_rng([self.seed, len(rows)])
-            rows.append(kill(VERBS[name], self.folder.absolute() / name, self.kills, rng))
-            print(rows[-1], flush=True)
+        rows = [self._row(name, self.folder.absolute() / name) for name in self.verbs]
         return {"kills": self.kills, "seed": self.seed, "rows": rows}
+
+    def _row(self, name: str, folder: Path) -> dict[str, Any]:
+        """Return a verb's numbers, kept ones if it is finished with as many kills and this seed."""
+        kept, asked = folder / "row.json", {"kills": self.kills, "seed": self.seed}
+        if kept.exists():
+            row: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8"))
+            if row.items() >= asked.items():
+                return row
+        shutil.rmtree(folder, ignore_errors=True)
+        rng = np.random.default_rng([self.seed, list(VERBS).index(name)])
+        row = {**kill(VERBS[name], folder, self.kills, rng), **asked}
+        print(row, flush=True)
+        write_json(kept, row)
+        return row
 
 
 def kill(verb: Verb, folder: Path, kills: int, rng: np.random.Generator) -> dict[str, Any]:
