@@ -23,9 +23,9 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.cli import guard, read_options
 from hopping_leg.cli.option_help import word_of
-from hopping_leg.cli.options import KEPT, command_line
+from hopping_leg.cli.options import KEPT, check_outputs, command_line, save_json
 from hopping_leg.errors import UsageError
-from hopping_leg.io import versions, write_atomically, write_json
+from hopping_leg.io import versions, write_atomically
 from studies import readmes
 
 ROOT = Path(__file__).parent.parent
@@ -60,12 +60,13 @@ def _run(name: str, options: Any, given: Sequence[str]) -> int:  # noqa: ANN401
     program = f"python -m studies.{name}"
     about = inspect.getdoc(importlib.import_module(f"studies.{name}"))
     args = read_options(options, program, about, given)
+    check_outputs(args)
     if get_args(options):
         program = f"{program} {word_of(type(args))}"
     command = command_line(program, args, KEPT | {"recordings"})
     result = {"command": command, **args.measure()}
+    save_json(args.json, result)
     if args.json is not None:
-        write_json(args.json, result)
         print(f"Wrote {args.json}.")
     return 0
 

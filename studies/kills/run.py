@@ -52,7 +52,7 @@ VERBS = {
     for verb in (
         Verb(
             "train",
-            f"{_HOP} train --recipe fast --set steps=60000 --heights 0.26 0.30 --resume"
+            f"{_HOP} train --recipe fast --set steps=20000 --heights 0.26 0.30 --resume"
             " --out {out}/run",
             ("run/policy.onnx", "run/result.json"),
         ),
@@ -70,13 +70,13 @@ VERBS = {
         ),
         Verb(
             "evaluate",
-            f"{_HOP} evaluate energy-shaping --no-video --seeds 1 --floor soft"
+            f"{_HOP} evaluate energy-shaping --no-video --seeds 1 --commands 0.3"
             " --json {out}/found.json",
             ("found.json",),
         ),
         Verb(
             "tune",
-            f"{_HOP} tune energy-shaping --generations 6 --population 8 --seconds 4"
+            f"{_HOP} tune energy-shaping --generations 3 --population 4 --seconds 2"
             " --out {out}/run --json {out}/found.json",
             ("found.json",),
         ),
@@ -159,7 +159,7 @@ def kill(verb: Verb, folder: Path, kills: int, rng: np.random.Generator) -> dict
             for _ in range(min(kills - done, _MOST)):
                 running = _start(verb.words, folder, out)
                 try:
-                    running.wait(float(rng.uniform(0, whole)))
+                    _wait(running, float(rng.uniform(0, whole)))
                 except subprocess.TimeoutExpired:
                     processes += _kill(running)
                     done += 1
@@ -198,7 +198,16 @@ def _start(words: str, folder: Path, out: Path) -> subprocess.Popen[bytes]:
 
 def _finish(running: subprocess.Popen[bytes]) -> bool:
     """Return whether a command ends well; a run that is finished already is refused, and is."""
-    return running.wait() in (0, 2)
+    return _wait(running) in (0, 2)
+
+
+def _wait(running: subprocess.Popen[bytes], seconds: float | None = None) -> int:
+    """Return a command's exit code; who interrupts this study ends the command, too."""
+    try:
+        return running.wait(seconds)
+    except KeyboardInterrupt:
+        _kill(running)
+        raise
 
 
 def _kill(running: subprocess.Popen[bytes]) -> int:
