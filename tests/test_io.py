@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import os
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -169,3 +170,15 @@ def test_a_failed_write_leaves_the_old_file_whole(tmp_path):
     with pytest.raises((TraceError, OSError)):
         write_atomically(path, b"new")
     assert path.read_bytes() == b"old"
+
+
+def test_an_interrupted_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
+    def interrupted(_):
+        raise KeyboardInterrupt
+
+    path = tmp_path / "result.json"
+    write_atomically(path, b"old")
+    monkeypatch.setattr(os, "fsync", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_atomically(path, b"new")
+    assert [(file, file.read_bytes()) for file in tmp_path.iterdir()] == [(path, b"old")]
