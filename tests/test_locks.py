@@ -1,10 +1,13 @@
 """What one process holds at a time: others are told who has it, and a dead one holds nothing."""
 
+import fcntl
 import os
 import socket
 import subprocess
 import sys
+import tempfile
 import tty
+from pathlib import Path
 
 import pytest
 
@@ -30,6 +33,22 @@ def test_a_second_one_is_refused_until_the_first_gives_it_back():
     first.close()
     first.close()
     named_lock("test-a/b", "the bus", UsageError).close()
+    assert not list(Path(tempfile.gettempdir()).glob("hopping-leg-test-a*"))
+
+
+def test_a_name_that_is_given_back_while_it_is_taken_has_one_holder(monkeypatch):
+    first, flock = named_lock("test-a", "the bus", UsageError), fcntl.flock
+
+    def late(descriptor, how):
+        first.close()
+        flock(descriptor, how)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(fcntl, "flock", late)
+        second = named_lock("test-a", "the bus", UsageError)
+    with pytest.raises(UsageError, match="the bus is in use by"):
+        named_lock("test-a", "the bus", UsageError)
+    second.close()
 
 
 def test_a_terminal_that_any_other_program_has_open_is_refused_with_its_name(tmp_path):

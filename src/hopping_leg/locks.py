@@ -24,41 +24,57 @@ class Lock:
         path: Device or file.
         what: Its name in messages.
         error: Raised where somebody else holds it; says who.
-        make: Whether the file is made if there is none; a device that is gone must not become one.
+        make: Whether it is a file that is made for this, and goes with ``close``.
     """
 
     def __init__(
-        self, path: Path, what: str, error: type[HoppingLegError], *, make: bool = True
+        self, path: Path, what: str, error: type[HoppingLegError], *, make: bool = False
     ) -> None:
-        flags = os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK
+        self._file: Path | None = None  # That goes with it
         try:
-            made = os.O_CREAT if make and not path.exists() else 0
-            self._descriptor = os.open(path, flags | made, 0o644)
+            self._descriptor, busy = _opened(path, make)
         except OSError as problem:
             raise error(f"Cannot open {path}: {problem.strerror}.") from problem
-        busy, terminal = False, os.isatty(self._descriptor)
-        try:
-            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            busy = True
-        others = list(_holders(path, served=terminal)) if busy or terminal else []
+        terminal = os.isatty(self._descriptor)
+        others = (
+            list(_holders(os.fstat(self._descriptor), served=terminal)) if busy or terminal else []
+        )
         if busy and not others:
             others = ["another process, or this one"]
         if others:
             self.close()
             raise error(f"{what} is in use by {' and '.join(others)}; end that first.")
+        self._file = path if make else None
 
     def close(self) -> None:
         """Give it back; again does nothing."""
         if self._descriptor >= 0:
+            if self._file is not None:
+                with contextlib.suppress(OSError):
+                    self._file.unlink()
             os.close(self._descriptor)
             self._descriptor = -1
+
+
+def _opened(path: Path, make: bool) -> tuple[int, bool]:
+    """Return a locked descriptor of a file, or another's and that it is busy."""
+    flags = os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK
+    while True:
+        made = os.O_CREAT if make and not path.exists() else 0
+        descriptor = os.open(path, flags | made, 0o644)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return descriptor, True
+        if not make or _same(path, os.fstat(descriptor)):
+            return descriptor, False
+        os.close(descriptor)  # who held it took the file away meanwhile
 
 
 def named_lock(name: str, what: str, error: type[HoppingLegError]) -> Lock:
     """Hold a name on this computer."""
     file = f"hopping-leg-{safe_file_name(name)}.lock"
-    return Lock(Path(tempfile.gettempdir()) / file, what, error)
+    return Lock(Path(tempfile.gettempdir()) / file, what, error, make=True)
 
 
 @contextlib.contextmanager
@@ -75,15 +91,12 @@ def hold_folder(folder: Path, error: type[HoppingLegError]) -> Iterator[None]:
     except OSError as problem:
         raise error(f"{folder} cannot be made a folder: {problem.strerror}.") from problem
     left = file.read_text(encoding="utf-8", errors="replace").strip() if file.exists() else ""
-    lock = Lock(file, str(folder), error)
+    if left and not left.endswith(f" on {here}"):
+        raise error(f"{folder} is in use by {left}; if that has ended, delete {file}.")
+    lock = Lock(file, str(folder), error, make=True)
     try:
-        if left and not left.endswith(f" on {here}"):
-            raise error(f"{folder} is in use by {left}; if that has ended, delete {file}.")
         file.write_text(f"process {os.getpid()} on {here}\n", encoding="utf-8")
-        try:
-            yield
-        finally:
-            file.unlink(missing_ok=True)
+        yield
     finally:
         lock.close()
         if made:
@@ -91,9 +104,8 @@ def hold_folder(folder: Path, error: type[HoppingLegError]) -> Iterator[None]:
                 folder.rmdir()
 
 
-def _holders(path: Path, *, served: bool) -> Iterator[str]:
+def _holders(sought: os.stat_result, *, served: bool) -> Iterator[str]:
     """Yield the other processes that have a file open, but for whoever serves it if it is."""
-    sought = path.stat()
     for process in Path("/proc").glob("[0-9]*"):
         if process.name == str(os.getpid()):
             continue

@@ -106,7 +106,7 @@ class Fdcanusb(LineTransport):
     """
 
     def __init__(self, path: str, checksums: bool | None = None) -> None:
-        self._lock = locks.Lock(Path(path), path, HardwareError, make=False)
+        self._lock = locks.Lock(Path(path), path, HardwareError)
         self._port = opened(self._lock, lambda: serial.Serial(path, _BAUD, timeout=0))
         wanted = not _is_fdcanusb(path) if checksums is None else checksums
         super().__init__(self._port.fileno(), checksums=wanted)
