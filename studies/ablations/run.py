@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from rich.console import Console
 from rich.table import Table
 
 from hopping_leg.cli.options import at_least
@@ -25,6 +24,7 @@ from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.rl.stages import within_reach
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
+from hopping_leg.terminal import plain_console
 from studies.ablations import ppo
 from studies.time_to_accuracy.run import JUDGING_SEEDS, judge
 
@@ -109,7 +109,7 @@ class Ablation:
         for name in self.variants:
             if name not in VARIANTS:
                 raise UsageError(unknown_name("variant", name, VARIANTS))
-        console, robot = Console(), load_robot(self.robot)
+        console, robot = plain_console(), load_robot(self.robot)
         cache = ResultCache(self.out, console.print)
         usual, _ = within_reach(FAST.replace(steps=self.steps).fit(robot), robot)
         rows: list[Row] = []

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
@@ -33,6 +32,7 @@ from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.hop_detection import measure_hops
 from hopping_leg.robot import JOINTS, SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE, SoftLimiter
+from hopping_leg.terminal import plain_console
 from hopping_leg.workers import ProcessWorkers
 
 Row = dict[str, Any]
@@ -89,7 +89,7 @@ class Endurance:
             numbers = (1e3 * row["median_error_m"], 1e3 * row["std_m"], row["hottest_c"])
             cells = [f"{row['command_m']:.2f}", row["reason"], f"{row['seconds']:.0f}"]
             table.add_row(row["controller"], *cells, *(f"{value:.1f}" for value in numbers))
-        Console().print(table)
+        plain_console().print(table)
         return {"robot": robot, "minutes": self.minutes, "seed": self.seed, "rows": rows}
 
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import polars as pl
-from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
@@ -26,6 +25,7 @@ from hopping_leg.evaluate.metrics import (
 )
 from hopping_leg.robot import DEFAULT_ROBOT, TIMESTEP, Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, NoiseAndDelay
+from hopping_leg.terminal import plain_console
 from hopping_leg.trace import Trace
 
 COMMANDS = (0.25, 0.30, 0.35)
@@ -164,7 +164,7 @@ class Baseline:
                 f"{row['body_contacts']}",
             ]
             table.add_row(row["case"], *numbers)
-        Console().print(table)
+        plain_console().print(table)
         return result
 
 

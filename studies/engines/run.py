@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
@@ -30,6 +29,7 @@ from hopping_leg.robot import TIMESTEP, Robot, load_robot
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.sim import CONTROL_RATE, Engine, Ground, make_simulator
 from hopping_leg.sim.pybullet.world import import_pybullet
+from hopping_leg.terminal import plain_console
 from hopping_leg.workers import ProcessWorkers
 
 BAR = 0.015
@@ -279,4 +279,4 @@ def _print(result: dict[str, Any]) -> None:
             str(row["skipped_hops"]),
             "yes" if row["ordered"] else "no",
         )
-    Console().print(table)
+    plain_console().print(table)

@@ -16,13 +16,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from hopping_leg.cli.options import at_least
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.progress import ShareProgress
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
+from hopping_leg.terminal import plain_console
 from hopping_leg.workers import ProcessWorkers
 from studies.fault_campaign.case import Case, Result
 from studies.fault_campaign.families import FAMILIES
@@ -273,7 +273,7 @@ def _print(result: dict[str, Any]) -> None:
             reasons,
             _ms(row["reaction_p99_s"]),
         )
-    console = Console()
+    console = plain_console()
     console.print(table)
     console.print(
         f"{result['trials']} trials, {result['unsafe']} unsafe. Bad answer to safe command:"

@@ -37,6 +37,7 @@ from hopping_leg.rl.finetune.simulated import Guard, SimulatedTrials
 from hopping_leg.rl.finetune.trial_data import score
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
 from hopping_leg.sim.randomization import draw_twin
+from hopping_leg.terminal import plain_console
 
 FIRST_JUDGE = 1000
 """Of the seeds that judge; none of them has chosen anything."""
@@ -224,7 +225,7 @@ class Finetune:
         if not (self.twins and self.seeds):
             raise UsageError("--twins and --seeds each need at least one entry.")
         policy, robot = load_policy(self.policy), load_robot(self.robot)
-        console = Console()
+        console = plain_console()
         result = measure(
             Study(
                 policy,

@@ -16,6 +16,7 @@ from hopping_leg.cli.options import at_least
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.identify.result import software_versions
 from hopping_leg.identify.search import Report
+from hopping_leg.terminal import plain_console
 from studies.identification import excitations
 from studies.identification.arm import coverage
 from studies.identification.bars import bars
@@ -175,7 +176,7 @@ class Identify(Study):
                     f"--{name.replace('_', '-')} is {getattr(self, name):g} but must lie between"
                     f" {least} and 3600."
                 )
-        console = Console()
+        console = plain_console()
         with _Progress(console) as progress:
             result = bench_identify(
                 self,

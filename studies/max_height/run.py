@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
@@ -27,6 +26,7 @@ from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.robot import DEFAULT_ROBOT, JOINTS, Robot, load_robot
 from hopping_leg.robot.kinematics import foot_position, joint_angles
 from hopping_leg.sim import LegSimulator
+from hopping_leg.terminal import plain_console
 
 KNOTS = (0.45, 0.65, 0.85, 0.97)
 """Leg lengths, over the straight leg's, between which the torques are interpolated."""
@@ -99,7 +99,7 @@ class Reach:
             names = ("apex_m", "hop_rate_hz", "rms_hip_torque_nm", "rms_knee_torque_nm")
             cells = [f"{row[name]:.3g}" for name in names]
             table.add_row(*limits, *cells, str(row["body_contacts"]))
-        Console().print(table)
+        plain_console().print(table)
         return result
 
     @cached_property

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
@@ -25,6 +24,7 @@ from hopping_leg.evaluate.motor_load import motor_load
 from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.hop_detection import measure_hops
 from hopping_leg.robot import Robot, load_robot
+from hopping_leg.terminal import plain_console
 from hopping_leg.workers import ProcessWorkers
 from studies.mpc.late import LateMpc
 
@@ -177,7 +177,7 @@ class Reach:
                 numbers = (1e3 * hops.median_error_m, 1e3 * hops.std_m, hops.rms_hip_torque_nm)
                 cells = [f"{value:.1f}" for value in (*numbers, hops.mean_power_w)]
                 table.add_row(name, f"{hops.command_m:.2f}", *cells)
-        Console().print(table)
+        plain_console().print(table)
         return {"rows": rows, "seed": self.seed}
 
 
@@ -233,7 +233,7 @@ class Search:
         ]
         for row in shape:
             table.add_row(row["name"], f"{row['shipped']:.3f}", f"{row['found']:.3f}")
-        Console().print(table)
+        plain_console().print(table)
         costs = dict(zip(pair, judged, strict=True))
         return {"shape": shape, "robots": self.robots, "costs_mm": costs, "seed": self.seed}
 

@@ -12,7 +12,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
@@ -25,6 +24,7 @@ from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim import Simulator
 from hopping_leg.sim.mujoco_simulator import MujocoSimulator
+from hopping_leg.terminal import plain_console
 
 TOLERANCE = 0.5e-3
 """By how much halving the step may move a median or a standard deviation, m."""
@@ -246,7 +246,7 @@ def _print(result: dict[str, Any]) -> None:
             *("-" if value is None else f"{value * 1e3:.1f}" for value in lengths),
             str(row["hops"]),
         )
-    console = Console()
+    console = plain_console()
     console.print(table)
     for row in result["converged"]:
         console.print(f"{row['controller']} on {row['robot']}: {_says(row['timestep_s'])}.")

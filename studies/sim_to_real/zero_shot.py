@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from hopping_leg import io
@@ -28,6 +27,7 @@ from hopping_leg.hop_detection import find_hops, measure_hops
 from hopping_leg.robot import JOINTS, Robot, load_robot, parent_robot
 from hopping_leg.sim_to_real.jobs import StoredJob, work_through
 from hopping_leg.sim_to_real.transfer import disturbance_of, drawn_twin
+from hopping_leg.terminal import plain_console
 
 COMMANDS = (0.22, 0.24, 0.26, 0.28, 0.30, 0.32, 0.34, 0.36, 0.38, 0.40)
 """Apex heights of a leg of the paper's size, m; others are asked for as many times as much."""
@@ -289,5 +289,5 @@ def _show(summary: Sequence[dict[str, Any]], reached: int, every: int) -> None:
             str(row["body_contacts"]),
             f"{100 * row['would_be_stopped']:.1f}",
         )
-    Console().print(table)
+    plain_console().print(table)
     say(f"{reached} of {every} pairs of leg and command are within reach of {MPC_TRUE_STATE}.")

@@ -36,6 +36,7 @@ from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.hop_detection import BOUNCE, FLIGHT_CLEARANCE, find_hops
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, SoftLimiter
+from hopping_leg.terminal import plain_console
 from hopping_leg.trace import Trace
 from studies.shared import host
 from studies.speed.inference import bench_inference
@@ -117,7 +118,7 @@ class Deploy:
         for name, value, least in (("minutes", self.minutes, 0.05), ("seconds", self.seconds, 3.0)):
             if not least <= value <= 600:
                 raise UsageError(f"--{name} is {value:g} but must lie between {least:g} and 600.")
-        console = Console()
+        console = plain_console()
         result = bench_deploy(self, lambda words: console.print(f"{words} ..."))
         _print(console, result)
         return result

@@ -15,7 +15,6 @@ import gymnasium
 import mujoco
 import numpy as np
 from mujoco import batch
-from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
@@ -25,6 +24,7 @@ from hopping_leg.envs import HoppingEnv, HoppingTask, TaskConfig, paper_reward
 from hopping_leg.robot import COARSE_TIMESTEP, DEFAULT_ROBOT, build_model, load_robot
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.sim import LegSimulator
+from hopping_leg.terminal import plain_console
 from studies.shared import Timed, host, interleave, median_ratio
 
 _BENT, _STRETCHED = 0.55, 0.8
@@ -247,4 +247,4 @@ def _print(title: str, result: dict[str, Any]) -> None:
     for name, value in result.items():
         if isinstance(value, int | float):
             table.add_row(name, f"{value:,.4g}" if value < 100 else f"{value:,.0f}")
-    Console().print(table)
+    plain_console().print(table)

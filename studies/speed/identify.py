@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from hopping_leg.cli.options import at_least
@@ -15,6 +14,7 @@ from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import cut
 from hopping_leg.robot import COARSE_TIMESTEP, load_robot
+from hopping_leg.terminal import plain_console
 from studies.identification.arm import draw_truth, record_arm
 from studies.identification.twin import BELIEVED, record_paper
 from studies.shared import host
@@ -63,7 +63,7 @@ class Identify:
         for name, value in result.items():
             if isinstance(value, int | float):
                 table.add_row(name, f"{value:.4g}")
-        Console().print(table)
+        plain_console().print(table)
         return result
 
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import onnxruntime
 import tyro
-from rich.console import Console
 from rich.table import Table
 
 from hopping_leg.arrays import Array
@@ -18,6 +17,7 @@ from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_policy, shipped_policies
 from hopping_leg.errors import UsageError
 from hopping_leg.sim import SAMPLES, Measurement
+from hopping_leg.terminal import plain_console
 from studies.shared import host
 
 
@@ -113,5 +113,5 @@ class Inference:
             times = ("inference_median_us", "inference_p99_us", "controller_median_us")
             cells = [f"{row[name]:.1f}" for name in (*times, "controller_p99_us")]
             table.add_row(row["policy"], *cells)
-        Console().print(table)
+        plain_console().print(table)
         return result

@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import tyro
 from PIL import Image
-from rich.console import Console
 from rich.table import Table
 
 from hopping_leg.arrays import Array
@@ -28,6 +27,7 @@ from hopping_leg.cli.options import at_least
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import DEFAULT_ROBOT
+from hopping_leg.terminal import plain_console
 from hopping_leg.viewer.live_leg import LiveSimulation
 from hopping_leg.viewer.viewer import FRAME_RATE, Viewer
 from studies.shared import host
@@ -93,7 +93,7 @@ class View:
         at_least(1, commands=self.commands)
         if not 1 <= self.seconds <= 600:
             raise UsageError(f"--seconds is {self.seconds:g} but must lie between 1 and 600.")
-        console = Console()
+        console = plain_console()
         result = bench_view(self, lambda words: console.print(f"{words} ..."))
         table = Table("measured", "value")
         for watched in (result, result["small_window"]):

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from rich.console import Console
 from rich.table import Table
 
 from hopping_leg.colours import controller_colours
@@ -27,6 +26,7 @@ from hopping_leg.rl.recipes import RECIPES
 from hopping_leg.rl.run_folder import read_result
 from hopping_leg.rl.train import train
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
+from hopping_leg.terminal import plain_console
 from studies.time_to_accuracy import sb3
 
 JUDGING_SEEDS = (1000, 1001)
@@ -61,7 +61,7 @@ class TimeToAccuracy:
 
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
-        console = Console()
+        console = plain_console()
         cache = ResultCache(self.out / "judged", console.print)
         rows: list[Row] = []
         spent: list[Row] = []
