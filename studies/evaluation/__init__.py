@@ -27,6 +27,15 @@ def _other(robot: str) -> tuple[str, str]:
     )
 
 
+def _universal(robot: str) -> str:
+    """Return the command that evaluates `universal` on a robot, beside energy shaping."""
+    options = f"--seeds 5 --robot {robot}"
+    return _trials("universal energy-shaping", f"universal_{robot}.json", options)
+
+
+LEGS = ("legv2-identified", "legv2", "legv2-paper", "legv1")
+"""Robots on which `universal` is evaluated."""
+
 _ELSEWHERE = ("legv2", "legv2-paper")
 """Robots on which `precise` is trained, too."""
 
@@ -37,6 +46,7 @@ RESULTS = (
     ),
     "hop report figures runs/results/traces/*.parquet --out studies/evaluation/figures",
     _trials(f"paper {_BASELINES} energy-shaping-literal", "paper.json", "--seeds 10"),
+    *(_universal(robot) for robot in LEGS),
     _precise("precise", "precise"),
     _precise("precise", "precise_fine_step", "--timestep 3.125e-05"),
     _precise("precise", "precise_no_soft_limits", "--no-soft-limits"),
@@ -46,10 +56,23 @@ RESULTS = (
     "cp runs/results/robustness/robustness.svg studies/evaluation/figures",
     f"hop robustness paper {_BASELINES} --seeds 3 --out runs/results/paper_robustness --json "
     "studies/evaluation/results/paper_robustness.json",
+    f"hop robustness universal {_BASELINES} --seeds 3 --out runs/results/universal_robustness "
+    "--json studies/evaluation/results/universal_robustness.json",
+    "hop skills universal energy-shaping --floor soft --json "
+    "studies/evaluation/results/universal_skills.json",
     "hop skills fast precise energy-shaping --floor soft --json "
     "studies/evaluation/results/skills.json",
     "hop skills paper energy-shaping --json studies/evaluation/results/paper_skills.json",
 )  # fmt: skip
+
+_ACCURACY = (
+    "command_m*1000=command, mm",
+    "median_error_m*1000=error, mm",
+    "std_m*1000=std, mm",
+    "skipped_hops=skipped",
+    "body_contacts=body contacts",
+    "outside_limits_fraction*100=outside limits, %",
+)
 
 _LOAD = (
     "command_m*1000=command, mm",
@@ -68,6 +91,11 @@ _LOAD = (
 )
 
 TABLES = (
+    *(
+        ("table", f"universal_{robot}.json", floor, "controller", *_ACCURACY)
+        for robot in LEGS
+        for floor in ("summary", "secondary.summary")
+    ),
     ("table", "evaluation.json", "summary", "controller", *_LOAD),
     ("table", "paper.json", "summary", "controller", *_LOAD),
     ("precision", "precise.json", 0.42),

@@ -18,11 +18,16 @@ Examples:
 """
 
 RESULTS = (
-    "python -m studies.sim_to_real zero-shot --twins 100 --seed 3000 --jobs 2 --out "
-    "runs/zero-shot-twins --json studies/sim_to_real/results/zero_shot_twins.json",
+    "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping --twins 100 "
+    "--seed 3000 --jobs 2 --out runs/zero-shot-twins "
+    "--json studies/sim_to_real/results/zero_shot_twins.json",
     "hop robots draw legs --count 50 --seed 3000 --out runs/legs && "
-    "python -m studies.sim_to_real zero-shot --folder runs/legs --jobs 2 --out "
-    "runs/zero-shot-legs --json studies/sim_to_real/results/zero_shot_legs.json",
+    "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping "
+    "--folder runs/legs --jobs 2 --out runs/zero-shot-legs "
+    "--json studies/sim_to_real/results/zero_shot_legs.json",
+    "python -m studies.sim_to_real transfer "
+    "--methods universal-identified universal energy-shaping --jobs 2 "
+    "--folder runs/transfer-universal --json studies/sim_to_real/results/universal.json",
     "python -m studies.sim_to_real transfer --jobs 2 --folder runs/transfer-fast --json "
     "studies/sim_to_real/results/fast.json",
     "python -m studies.sim_to_real prediction --twins 5 --jobs 2 --json "
@@ -47,24 +52,30 @@ ZERO_SHOT = (
 TABLES = (
     ("table", "zero_shot_twins.json", "summary", *ZERO_SHOT),
     ("table", "zero_shot_legs.json", "summary", *ZERO_SHOT),
-    (
-        "table",
-        "fast.json",
-        "methods",
-        "meaning=policies trained on",
-        "policies",
-        "median_abs_error_m*1000=error, mm",
-        "ordered=heights in order",
-    ),
-    (
-        "table",
-        "fast.json",
-        "comparison",
-        "method",
-        "over",
-        "ratio",
-        "ratio_low=from",
-        "ratio_high=to",
+    *(
+        part
+        for file in ("universal.json", "fast.json")
+        for part in (
+            (
+                "table",
+                file,
+                "methods",
+                "meaning=policies trained on",
+                "policies",
+                "median_abs_error_m*1000=error, mm",
+                "ordered=heights in order",
+            ),
+            (
+                "table",
+                file,
+                "comparison",
+                "method",
+                "over",
+                "ratio",
+                "ratio_low=from",
+                "ratio_high=to",
+            ),
+        )
     ),
     (
         "table",

@@ -322,8 +322,9 @@ class Experiment:
     methods: tuple[str, ...] | None = None
     """What policies are trained on, the others being compared with the first; or what foretells.
     Valid: identified, cad, table-1, randomised, identified-surprises, cad-surprises (these three
-    not to foretell), rail-only, fixed-base-only, two-pass, one-pass, truth. Default: the first
-    four; or all that can foretell."""
+    not to foretell), rail-only, fixed-base-only, two-pass, one-pass, truth; and, not trained,
+    energy-shaping, universal, universal-identified, mpc, mpc-identified. Default: the first four
+    and energy-shaping; or all that can foretell."""
     seeds: tuple[int, ...] = (0,)
     """Seeds of the trainings, one of each method and twin each."""
     recipe: str = Study.recipe
