@@ -42,6 +42,7 @@ ZERO_SHOT = (
     "within_3_percent*100=within 3 %, %",
     "closer_than_energy_shaping*100=closer than energy shaping, %",
     "median_abs_error_m*1000=median error, mm",
+    "worst_abs_error_m*1000=at the worst pair, mm",
     "median_std_m*1000=std, mm",
     "skipped_hops=skipped",
     "body_contacts=body contacts",

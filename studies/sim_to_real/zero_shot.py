@@ -179,6 +179,7 @@ def summarize(pairs: Sequence[dict[str, Any]], controllers: Sequence[str]) -> li
             **_share(own, "within_3_percent", errors <= 0.03 * heights),
             "closer_than_energy_shaping": float(np.mean(closer)) if closer else None,
             "median_abs_error_m": float(np.median(errors)) if own else None,
+            "worst_abs_error_m": float(errors.max()) if own else None,
             "median_std_m": float(np.median([r["std_m"] for r in own if r["std_m"] is not None])),
             "would_be_stopped": float(np.mean([row["would_be_stopped"] for row in own])),
             **{key: sum(row[key] for row in own) for key in ("skipped_hops", *_CONTACTS)},
