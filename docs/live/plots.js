@@ -11,9 +11,9 @@ const TIMES = 20; // px for the time axis
 
 // A panel: title, share of the canvas's height, unit's range of values, and the rows' column.
 const panels = (top, limits) => [
-  { title: "height, m", share: 0.46, low: 0, high: top, column: 1, step: 0.1 },
-  { title: "hip torque, N m", share: 0.27, low: -limits[0], high: limits[0], column: 2 },
-  { title: "knee torque, N m", share: 0.27, low: -limits[1], high: limits[1], column: 3 },
+  { title: "height / m", share: 0.46, low: 0, high: top, column: 1, step: 0.1 },
+  { title: "hip torque / N m", share: 0.27, low: -limits[0], high: limits[0], column: 2 },
+  { title: "knee torque / N m", share: 0.27, low: -limits[1], high: limits[1], column: 3 },
 ];
 
 // Draw the past of `legs`, each with its colour; heights up to `top`, m, torques up to `limits`.
@@ -47,7 +47,7 @@ export function drawPlots(canvas, colours, legs, top, limits) {
   context.fillStyle = colours.soft;
   context.textAlign = "center";
   for (let age = 0; age <= SECONDS; age++) {
-    context.fillText(age ? `\u2212${age}` : "now", Math.min(x(age), width - 14), height - 5);
+    context.fillText(age ? `\u2212${age} s` : "now", Math.min(x(age), width - 14), height - 5);
   }
   context.textAlign = "left";
 }
