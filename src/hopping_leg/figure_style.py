@@ -65,11 +65,13 @@ def colour(index: int) -> str:
 
 
 def plain_log(axes: Axes, *sides: Literal["x", "y"]) -> None:
-    """Make axes logarithmic, with plain numbers at 1, 2 and 5 of every decade."""
+    """Make axes logarithmic, with plain numbers at 1, 2 and 5 of a decade; more on short ones."""
     for side in sides:
         getattr(axes, f"set_{side}scale")("log")
         axis = getattr(axes, f"{side}axis")
-        axis.set_major_locator(LogLocator(10, (1, 2, 5)))
+        low, high = axis.get_data_interval()
+        marks = (1, 2, 5) if high > 10 * low else (1, 1.5, 2, 3, 4, 5, 6, 7, 8)
+        axis.set_major_locator(LogLocator(10, marks))
         axis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axis.set_minor_locator(NullLocator())
 
