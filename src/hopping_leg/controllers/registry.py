@@ -22,6 +22,9 @@ ENERGY_SHAPING_FLYING = "energy-shaping-flying"
 ENERGY_SHAPING_LITERAL = "energy-shaping-literal"
 """The paper's law and gains as printed."""
 
+MPC = "mpc"
+"""Plans every push from what a particle filter makes of the joints."""
+
 MPC_TRUE_STATE = "mpc-true-state"
 """Plans every push in the true state: in simulation alone."""
 
@@ -34,6 +37,7 @@ _FACTORIES: dict[str, Callable[..., protocol.Controller]] = {
         energy_shaping.tuned_energy_shaping, gains=ENERGY_SHAPING_FLYING
     ),
     ENERGY_SHAPING_LITERAL: energy_shaping.paper_energy_shaping,
+    MPC: mpc.Mpc,
     MPC_TRUE_STATE: mpc.TrueStateMpc,
 }
 _SHIPPED = resources.files("hopping_leg") / "policies"
