@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Mapping, Sequence
+from statistics import median
 from typing import Any, cast
 
 import numpy as np
@@ -83,9 +84,9 @@ def draw_phase_space(traces: Mapping[str, Trace]) -> Figure:
     figure = Figure(figsize=(WIDTH, 3.0 * len(traces) + 0.4), layout="constrained")
     panels = figure.subplots(len(traces), 2, sharex=True, sharey=True, squeeze=False)
     shown = {name: _phase_space(trace) for name, trace in traces.items()}
-    torques = np.concatenate([np.abs(found["knee_command_nm"]) for found in shown.values()])
-    limit = float(np.nanpercentile(torques, _TYPICAL)) if np.isfinite(torques).any() else 0.0
-    limit = limit or 1.0
+    torques = [np.abs(found["knee_command_nm"]) for found in shown.values()]
+    ranges = [float(np.nanpercentile(t, _TYPICAL)) for t in torques if np.isfinite(t).any()]
+    limit = median(ranges or [0.0]) or 1.0
     look: dict[str, Any] = {"cmap": figure_style.TORQUE_MAP, "vmin": -limit, "vmax": limit, "s": 9}
     look |= {"edgecolors": "0.6", "linewidths": 0.2, "rasterized": True}
     for row, (name, found) in zip(panels, shown.items(), strict=True):
