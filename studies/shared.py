@@ -101,7 +101,7 @@ def store(file: Path, command: str) -> None:
     """Rewrite a result as it is stored: with its command, without raw numbers, a line a record."""
     content = json.loads(file.read_text(encoding="utf-8"))
     for raw in ("pairs", "trials"):
-        if len(content.get(raw, ())) > 2 * LONGEST:
+        if isinstance(content.get(raw), list) and len(content[raw]) > 2 * LONGEST:
             del content[raw]
     if len(content.get("summary", ())) > 2 * LONGEST:
         content = {key: entry for key, entry in content.items() if key not in NOT_SHOWN}

@@ -66,10 +66,14 @@ def test_results_are_small():
 
 
 def test_what_is_stored_is_without_raw_numbers(tmp_path):
-    raw = {"raw": [0.5] * (LONGEST + 1), "rows": [{"a": 0.123456789, "names": ["x"] * 99}]}
-    assert condensed(raw) == {"rows": [{"a": 0.123457, "names": ["x"] * 99}]}
+    raw = {
+        "raw": [0.5] * (LONGEST + 1),
+        "trials": 9,
+        "rows": [{"a": 0.123456789, "names": ["x"] * 99}],
+    }
+    assert condensed(raw) == {"trials": 9, "rows": [{"a": 0.123457, "names": ["x"] * 99}]}
     file = tmp_path / "e.json"
     file.write_text(json.dumps(raw))
     store(file, "hop evaluate")
     assert json.loads(file.read_text()) == {**condensed(raw), "command": "hop evaluate"}
-    assert Path(file).read_text().count("\n") == 9
+    assert Path(file).read_text().count("\n") == 10
