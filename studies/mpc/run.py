@@ -212,7 +212,7 @@ class Observer:
                     numbers = (1e3 * hops.median_error_m, 1e3 * hops.std_m)
                     cells = [f"{value:.1f}" for value in numbers]
                     table.add_row(name, controller, f"{hops.command_m:.2f}", *cells)
-        Console().print(table)
+        plain_console().print(table)
         return {"rows": rows, "seed": self.seed}
 
 
