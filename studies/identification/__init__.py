@@ -16,6 +16,8 @@ RESULTS = (
     "studies/identification/results/paper_size.json",
     "python -m studies.identification --parts recordings --json "
     "studies/identification/results/recordings.json",
+    "python -m studies.identification --parts friction --json "
+    "studies/identification/results/friction.json",
 )
 
 TABLES = (
@@ -51,4 +53,15 @@ TABLES = (
     ),
     ("table", "paper_size.json", "bars", "what", "bar", "measured", "unit", "reached"),
     ("table", "recordings.json", "bars", "what", "bar", "measured", "unit", "reached"),
+    ("table", "friction.json", "bars", "what", "bar", "measured", "unit", "reached"),
+    (
+        "table",
+        "friction.json",
+        "friction.rows",
+        "states",
+        "law",
+        "left_nm=left on held-out recordings, N m, rms",
+        "share=over today's",
+        "worst_share=worst recording and joint",
+    ),
 )

@@ -3,6 +3,7 @@
 from typing import Any
 
 from hopping_leg.robot.parameters import JOINTS
+from studies.identification.friction import LAWS, SMOOTHED
 from studies.identification.synthetic import FIXED, HOPPING, RAIL
 
 
@@ -12,7 +13,7 @@ def bars(result: dict[str, Any]) -> list[dict[str, Any]]:
     Args:
         result: Of the benchmark, by part.
     """
-    found = [*_synthetic(result), *_speed(result), *_real(result)]
+    found = [*_synthetic(result), *_speed(result), *_real(result), *_friction(result)]
     return [
         {
             "what": what,
@@ -84,6 +85,14 @@ def _excitations(result: dict[str, Any]) -> list[Bar]:
         )
         for long, short in zip(rows[::2], rows[1::2], strict=True)
     ]  # fmt: skip
+
+
+def _friction(result: dict[str, Any]) -> list[Bar]:
+    """Return what the best further law leaves of the torques of held-out recordings."""
+    rows = result.get("friction", {}).get("rows", [])
+    shares = [row["share"] for row in rows if row["states"] == SMOOTHED and row["law"] in LAWS]
+    what = "double pendulum, held-out torque: best further law of friction over today's"
+    return [(what, 0.6, "times", min(shares), False)] if shares else []
 
 
 def _real(result: dict[str, Any]) -> list[Bar]:

@@ -21,6 +21,7 @@ from studies.identification import excitations
 from studies.identification.arm import coverage
 from studies.identification.bars import bars
 from studies.identification.fits import METHODS
+from studies.identification.friction import friction
 from studies.identification.mujoco_sysid import mujoco_sysid
 from studies.identification.real import real
 from studies.identification.study import FitCache, Study
@@ -36,6 +37,7 @@ PARTS = (
     "mujoco-sysid",
     "paper-size",
     "recordings",
+    "friction",
 )
 """What can be measured, in order."""
 
@@ -126,6 +128,10 @@ def bench_identify(
         }
     if "recordings" in parts and recordings is not None:
         result["recordings"] = real(study, cache, recordings)
+    if "friction" in parts and recordings is not None:
+        result["friction"] = friction(
+            recordings, study.seed, lambda stage: cache.report(stage, 0.0, 0.0)
+        )
     return {**result, "bars": bars(result), "versions": software_versions()}
 
 
@@ -155,8 +161,8 @@ class Identify(Study):
     """
 
     parts: tuple[str, ...] = ()
-    """Of synthetic, throughput, coverage, excitations, mujoco-sysid, paper-size and recordings;
-    default: all."""
+    """Of synthetic, throughput, coverage, excitations, mujoco-sysid, paper-size, recordings and
+    friction; default: all."""
     recordings: Path | None = None
     """Folder with real recordings; default: the environment's HOPPING_LEG_RECORDINGS, if set."""
     out: Path = Path("runs/bench-identify")

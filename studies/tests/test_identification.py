@@ -10,7 +10,7 @@ from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import cut
 from hopping_leg.robot import COARSE_TIMESTEP, load_robot
-from studies.identification import excitations, mujoco_sysid
+from studies.identification import excitations, friction, mujoco_sysid
 from studies.identification.bars import bars
 from studies.identification.fits import compare, summary
 from studies.identification.real import real
@@ -40,6 +40,24 @@ def test_plain_loop_and_replay_simulate_the_same(motion, error):
     start = np.array([recordings[0].array("position")[w.start] for w in windows])
     np.testing.assert_allclose(plain[:, 0], start, atol=1e-9)
     assert np.ptp(plain, axis=1).max() > 0.2
+
+
+def test_a_law_of_friction_helps_where_it_is_the_truths_and_noise_helps_nothing():
+    rng = np.random.default_rng(0)
+    every = []
+    for _ in range(4):
+        plain, right, wrong = (rng.normal(size=(800, k)) for k in (3, 4, 64))
+        right[:400, 2:] = right[400:, :2] = 0.0
+        target = plain @ (1.0, 2.0, 3.0) + right @ np.ones(4) + 0.3 * rng.normal(size=800)
+        columns = dict.fromkeys(friction.LAWS, wrong) | {"Stribeck": right}
+        every.append(friction.Equations(plain, columns, target))
+    rows = {row["law"]: row for row in friction.judge(every)["rows"]}
+    assert rows["Stribeck"]["share"] < 0.3
+    assert rows["network"]["share"] == pytest.approx(1.0, abs=0.02)
+    result = {"friction": {"rows": [{"states": "smoothed", **row} for row in rows.values()]}}
+    (bar,) = bars(result)
+    assert bar["reached"]
+    assert bar["measured"] == rows["Stribeck"]["share"]
 
 
 def test_excitations_are_compared_leg_by_leg(monkeypatch):
