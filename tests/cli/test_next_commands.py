@@ -66,8 +66,9 @@ def shortened(words):
 
 def test_from_a_urdf_to_gains_and_an_evaluation(run, monkeypatch):
     shutil.copy(ROOT / "examples/leg.urdf", "a leg.urdf")
-    check, tune = run("robots", "import", "a leg.urdf", "--motor", "ak80-9")
+    check, view, tune = run("robots", "import", "a leg.urdf", "--motor", "ak80-9")
     assert run(*check[1:]) == []
+    parse(view, monkeypatch)
     parse(tune, monkeypatch)
     short = ["--generations", "1", "--population", "4", "--seconds", "3"]
     (evaluate,) = run(*tune[1:], *short)

@@ -169,6 +169,7 @@ def _import(args: Import) -> None:
     say(*(f"But {doubt}" for doubt in robot_files.doubts(out)))
     say_next(
         ["hop", "robots", "check", out],
+        ["hop", "view", "universal", "--robot", out],
         ["hop", "tune", "energy-shaping", "--robot", out, "--out", f"runs/{out.stem}"],
     )
 
