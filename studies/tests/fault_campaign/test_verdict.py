@@ -24,9 +24,10 @@ def answered(time, mode=DriveMode.POSITION, voltage=24.0, temperature=30.0):
 
 
 def log(*entries):
+    answers = [e for e in entries if isinstance(e, ReplyEvent)]
     return SimpleNamespace(
         commands=[e for e in entries if isinstance(e, CommandEvent)],
-        answers=[e for e in entries if isinstance(e, ReplyEvent)],
+        answers=lambda since: (e for e in answers if e.time >= since),
     )
 
 
