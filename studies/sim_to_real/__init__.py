@@ -21,6 +21,9 @@ RESULTS = (
     "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping --twins 100 "
     "--seed 3000 --jobs 2 --out runs/zero-shot-twins "
     "--json studies/sim_to_real/results/zero_shot_twins.json",
+    "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping mpc --twins 20 "
+    "--seed 3000 --commands 0.22,0.28,0.34,0.40 --jobs 2 --out runs/zero-shot-mpc "
+    "--json studies/sim_to_real/results/zero_shot_mpc.json",
     "hop robots draw legs --count 50 --seed 3000 --out runs/legs && "
     "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping "
     "--folder runs/legs --jobs 2 --out runs/zero-shot-legs "
@@ -52,6 +55,7 @@ ZERO_SHOT = (
 
 TABLES = (
     ("table", "zero_shot_twins.json", "summary", *ZERO_SHOT),
+    ("table", "zero_shot_mpc.json", "summary", *ZERO_SHOT),
     ("table", "zero_shot_legs.json", "summary", *ZERO_SHOT),
     *(
         part
