@@ -1,6 +1,9 @@
 """Does kill -9 at any moment change a result, or leave something behind?"""
 
-RESULTS = ("python -m studies.kills --kills 30 --json studies/kills/results/kills.json",)
+RESULTS = (
+    "python -m studies.kills --verbs evaluate tune --kills 3"
+    " --json studies/kills/results/kills.json",
+)
 
 TABLES = (
     (
