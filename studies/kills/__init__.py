@@ -1,7 +1,7 @@
 """Does kill -9 at any moment change a result, or leave something behind?"""
 
 RESULTS = (
-    "python -m studies.kills --verbs evaluate tune --kills 3"
+    "python -m studies.kills --verbs train evaluate tune --kills 3"
     " --json studies/kills/results/kills.json",
 )
 
