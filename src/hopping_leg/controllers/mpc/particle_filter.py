@@ -37,7 +37,7 @@ _NOISY = 0.008  # share of measured values from which on they are noisy
 class FilterOptions:
     """What a particle filter assumes; noise is standard deviations per control period."""
 
-    particles: int = 300
+    particles: int = 500
     """How many."""
     steps: int = 5
     """Physics steps per control period."""
@@ -53,18 +53,20 @@ class FilterOptions:
     """Of a measured speed, rad/s, beyond the share that its samples show to be noise."""
     measured_angle: float = 2e-4
     """Of a measured angle, rad, likewise."""
-    payload: float = 0.0
-    """Spread of a parameter at first, see ``PARAMETERS``."""
-    rail_friction: float = 0.0
+    payload: float = 0.2
+    """Spread of a parameter where track is lost, see ``PARAMETERS``."""
+    rail_friction: float = 1.0
     """The same."""
     ground_time: float = 0.8
     """The same."""
-    knee_gain: float = 0.0
+    knee_gain: float = 0.1
     """The same."""
     kernel: float = 0.98
     """Share of a parameter's distance from the mean that resampling leaves."""
+    first_spread: float = 0.1
+    """Spread at first, when the file is believed, over that where track is lost."""
     least_spread: float = 0.1
-    """Least spread that it restores, over the first one."""
+    """Least spread that resampling restores, over the same."""
     adapt: float = 0.03
     """Weight of an innovation in the scale of noise."""
     most_noise: float = 25.0
@@ -190,7 +192,7 @@ class ParticleFilter:
         state[:, 0] += 0.002 * draws[:, 4] - 0.001
         state[:, 3] = 0.02 * draws[:, 5]
         spread = np.array([getattr(how, name) for name in PARAMETERS])
-        own["parameters"] = spread * draws[:, 6:10]
+        own["parameters"] = how.first_spread * spread * draws[:, 6:10]
 
     def _new(self, age: Array, fine: BoolArray) -> IntArray:
         """Return the places of samples in the past, -1 of those that are known, (n, 3)."""
