@@ -364,6 +364,15 @@ def test_mujoco_writes_no_log_into_the_users_folder(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_training_leaves_nothing_in_the_temporary_folder(tmp_path):
+    pytest.importorskip("torch", reason="the extra 'train' is not installed")
+    code = "import hopping_leg.rl.train; import torch; torch.optim.Adam([torch.zeros(1)])"
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("TORCHINDUCTOR")}
+    environment["TMPDIR"] = str(tmp_path)
+    subprocess.run([sys.executable, "-c", code], env=environment, check=True)
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("text", ["[red]run[/red]", "[/]", "a :smile: b", "[link=x]"])
 def test_no_text_of_a_user_is_taken_for_markup(capsys, text):
     show_table(("name", text), [(text, 1)], text)
