@@ -39,6 +39,9 @@ SHORTER = {
     "hop identify": {"--parameters": "hip.friction,knee.friction"},
     "hop record --transport": {"--yes": None},
     "hop train": {"--steps": "1", "--heights": "0.28 0.32"},
+    "hop train --recipe universal": {
+        "--steps": "1", "--heights": "0.28 0.32", "--set": "num_envs=64 batch_size=1024",
+    },
     "hop tune": {"--trials": "1", "--steps": "1", "--workers": "1", "--snapshots": "1"},
     "hop tune energy-shaping": {"--generations": "1", "--population": "4", "--seconds": "3"},
     "hop view": {"--no-browser": None, "--port": "0", "--seconds": "0.5"},

@@ -22,8 +22,8 @@ def study(folder, methods=("identified", "cad"), **options):
     return Study(folder, find_twins(["2"], folder / "twins"), choose_methods(methods), **options)
 
 
-def main(words):
-    return shared.main("sim_to_real", Options, ["transfer", *words])
+def main(words, part="transfer"):
+    return shared.main("sim_to_real", Options, [part, *words])
 
 
 CHEAP = ["--steps", "1", "--repeats", "1", "--commands", "0.3"]
@@ -81,9 +81,9 @@ def test_a_study_is_finished_once_and_grows(tmp_path, capsys):
 @pytest.mark.slow
 def test_simulations_foretell_without_a_training(tmp_path, capsys):
     folder, file = tmp_path / "study", tmp_path / "out.json"
-    words = ["prediction", "--folder", str(folder), "--json", str(file)]
+    words = ["--folder", str(folder), "--json", str(file)]
     words += ["--twins", "2", "--repeats", "1", "--commands", "0.25,0.35"]
-    assert main([*words, "--methods", "truth", "cad"]) == 0
+    assert main([*words, "--methods", "truth", "cad"], "prediction") == 0
     found = json.loads(file.read_text())
     assert found["command"].startswith("python -m studies.sim_to_real prediction --twins 2")
     told = {row["method"]: row for row in found["methods"] if row["controller"] == "fast"}
@@ -91,7 +91,7 @@ def test_simulations_foretell_without_a_training(tmp_path, capsys):
     assert set(told["truth"]["errors_m"]) == {"twin-0", "twin-1"}
     assert not (folder / "training").exists()
     assert "foretells" in capsys.readouterr().out
-    assert main([*words, "--methods", "randomised"]) == 2
+    assert main([*words, "--methods", "randomised"], "prediction") == 2
     assert "none foretells" in capsys.readouterr().err
 
 
