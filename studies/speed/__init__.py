@@ -5,7 +5,7 @@ RESULTS = (
     "python -m studies.speed identify --json studies/speed/results/identify.json",
     "python -m studies.speed inference --json studies/speed/results/inference.json",
     "python -m studies.speed view --json studies/speed/results/view.json",
-    "python -m studies.speed deploy --minutes 5 --json studies/speed/results/deploy.json",
+    "python -m studies.speed deploy --json studies/speed/results/deploy.json",
 )
 
 TABLES = (
