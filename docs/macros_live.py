@@ -23,7 +23,6 @@ from hopping_leg.controllers.energy_shaping.gains import (
 )
 from hopping_leg.controllers.mpc import HopShape
 from hopping_leg.controllers.observation_history import OBSERVATION_HISTORIES, AnyLeg, Dated
-from hopping_leg.controllers.policy import HEIGHT
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.html_page import data_uri
@@ -42,7 +41,7 @@ from hopping_leg.robot.model import (
     STOP_IMPEDANCE,
     STOP_TIME_CONSTANT,
 )
-from hopping_leg.robot.parameters import DEFAULT_STOPS
+from hopping_leg.robot.parameters import DEFAULT_STOPS, PAPER_HEIGHT
 from hopping_leg.sim import CONTROL_RATE, NoiseAndDelay
 from hopping_leg.sim.channel import DELAY_DEPTH
 from hopping_leg.viewer import live_settings
@@ -137,7 +136,7 @@ def data(policies: dict[str, str]) -> dict[str, Any]:
             "least": robot_numbers.LEAST,
             "most": robot_numbers.MOST,
             "usual": robot_numbers.USUAL,
-            "straight_height": HEIGHT,
+            "straight_height": PAPER_HEIGHT,
         },
         "shape": dataclasses.asdict(HopShape()),
         "controllers": CONTROLLERS,

@@ -97,9 +97,6 @@ OtherRobot = Literal["refuse", "warn", "accept"]
 """What to do with a policy that was trained for another robot."""
 
 _log = logging.getLogger(__name__)
-HEIGHT = 0.30
-"""Straight height of the leg that cards of policies for any leg give heights for, m."""
-
 _ROUNDING = 1e-9
 _MOST_RATE = 1e4  # Hz
 _MARGIN = 0.25
@@ -239,7 +236,7 @@ class Policy:
         """Say what leg it is on, as far as is known: that counts where it is for any leg."""
         self._layout.set_robots([robot])
         if self.for_any_leg:
-            self.scale = robot.straight_height / HEIGHT
+            self.scale = robot.size
 
     @property
     def remembers(self) -> bool:

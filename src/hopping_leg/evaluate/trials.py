@@ -15,12 +15,11 @@ from hopping_leg.robot import Contact, GroundMismatch, Robot, command_limits
 from hopping_leg.trace import Trace
 
 COMMANDS = (0.25, 0.30, 0.35)
-"""Apex heights the paper trains and tests, m, for a leg of ``PAPER_HEIGHT``."""
+"""Apex heights the paper trains and tests, m, for a leg of the paper's size."""
 STAIRCASE = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)
 """Commands of the 30 s trial, m, 5 s each (Fig. 5)."""
 LADDER = (0.22, 0.24, 0.26, 0.28, 0.30, 0.32, 0.34, 0.36, 0.38, 0.40)
 """Commands that show how a controller interpolates and where it ends, m."""
-PAPER_HEIGHT = 0.30  # straight, of the leg that the commands were made for, m
 KINDS = ("fixed", "sequence", "staircase", "ladder")
 FIXED_SECONDS = 15.0
 STEP_SECONDS = 5.0
@@ -40,8 +39,7 @@ class Trial(CommandSchedule):
 
 def scaled(heights: Sequence[float], robot: Robot) -> tuple[float, ...]:
     """Return the paper's heights for a leg of another size, m, rounded to 5 mm."""
-    ratio = robot.straight_height / PAPER_HEIGHT
-    return tuple(round(h * ratio * 200) / 200 for h in heights)
+    return tuple(round(h * robot.size * 200) / 200 for h in heights)
 
 
 def paper_trials(robot: Robot, commands: Sequence[float] | None = None) -> list[Trial]:

@@ -14,11 +14,9 @@ from hopping_leg.rl.learner import Learner
 from hopping_leg.rl.sac import NetworkConfig, SACConfig
 from hopping_leg.robot import DEFAULT_ROBOT, Robot
 
-HEIGHT = 0.30
-"""Straight height of the leg that the recipes' lengths are meant for, m."""
-
 WEIGHT_MOMENT = 0.548
-"""Its moving mass times its straight height, kg m: what hop torques grow with."""
+"""Moving mass times straight height of the leg that recipes are meant for, kg m: what hop torques
+grow with."""
 
 _PARTS = ("algorithm", "network", "schedule", "selection")
 """Parts whose options are named without the part."""
@@ -167,7 +165,7 @@ class Recipe:
         )
 
     def _grow(self, robot: Robot) -> Self:
-        ratio = robot.straight_height / HEIGHT
+        ratio = robot.size
         if abs(ratio - 1) < 0.01:
             return self
         task = self.task

@@ -50,13 +50,12 @@ def find_reach(
     The range, m, is that of a leg of the paper's size and grows with the leg.
     """
     robot = draw_any_leg(leg).true
-    scale = robot.straight_height / 0.30
-    asked = tuple(scale * float(h) for h in np.linspace(*heights, _HEIGHTS))
+    asked = tuple(robot.size * float(h) for h in np.linspace(*heights, _HEIGHTS))
     results = evaluate_policy(
         TrueStateMpc(robot, shape, planning), robot, asked, legs=1, seconds=_SECONDS,
         disturbance=NO_NOISE, timestep=_STEP, threads=1,
     )  # fmt: skip
-    runs = [list(run) for good, run in itertools.groupby(results, key=_reached(scale)) if good]
+    runs = [list(run) for good, run in itertools.groupby(results, key=_reached(robot.size)) if good]
     longest = max(runs, key=len, default=[])
     if len(longest) < _LEAST:
         return None

@@ -24,6 +24,10 @@ DEFAULT_STOPS = {"hip": float(np.pi), "knee": 2.7}
 """Where the joints of a leg whose file states no mechanical stops end, rad to either side: what
 recordings of leg V2 show."""
 
+PAPER_HEIGHT = 0.30
+"""Height of the paper's leg with the leg straight, m: commands and lengths that grow with a leg are
+for one of it."""
+
 
 @dataclass(frozen=True)
 class Base:
@@ -179,6 +183,11 @@ class Robot:
     def straight_height(self) -> float:
         """Height of the hip axis with the leg straight and the foot on the ground, m."""
         return self.thigh.length + self.shank.length + self.foot.radius
+
+    @property
+    def size(self) -> float:
+        """Straight height over that of the paper's leg."""
+        return self.straight_height / PAPER_HEIGHT
 
     def require_leg(self) -> None:
         """Refuse a pendulum where a robot has to stand or hop.

@@ -56,5 +56,5 @@ class Mpc(Planner):
         return {
             **super().internals(),
             "estimated_height_m": known.state[:, 0],
-            "estimated_apex_m": known.apex.copy(),
+            "estimated_apex_m": known.apex,
         }

@@ -65,7 +65,7 @@ class HopShape:
     most_landing: float = 7.12
     """Largest force on landing."""
     fold: float = 0.3
-    """Force with which a leg that stands folds; less than nothing pulls the hip down."""
+    """Force with which a leg that stands folds; a negative one pulls the hip down."""
     lean_from: float = 2.0
     """Push-off force beyond which the foot also pushes forward."""
     lean: float = 0.093
@@ -92,7 +92,7 @@ _SHAPE = np.dtype([(field.name, np.float64) for field in fields(HopShape)])
 
 
 class Planner:
-    """Plans the hops of legs, for which its heirs find states and parameters.
+    """Plans the hops of legs, for which its subclasses find states and parameters.
 
     Everything but the push-off force follows from the command. While a leg pushes, the force is the
     one with which a simulation of the hop's rest ends at the commanded apex; it is found anew in

@@ -42,7 +42,7 @@ def run_skills(
     check_labels(entries)
     for entry in entries:
         check_range(entry, chosen)
-    size = setup.robot.straight_height / trials.PAPER_HEIGHT
+    size = setup.robot.size
     stairs, drop = [size * level for level in STAIRS], size * landings.DROP
     tables: dict[str, list[dict[str, Any]]] = {}
 
