@@ -123,9 +123,15 @@ class Scene:
         require_fit(check_drives(self.robot, self.safety_limits, inspect(link)))
 
     def perform(
-        self, link: MoteusLink, folder: Path, clock: Clock | None, *, realtime: bool
+        self,
+        link: MoteusLink,
+        folder: Path,
+        clock: Clock | None,
+        *,
+        realtime: bool,
+        threaded: bool = True,
     ) -> Performance:
-        """Let the leg rise, hop beyond the mishap, sink and stop.
+        """Let the leg rise, hop beyond the mishap, sink and stop; see ``perform``.
 
         Raises:
             HardwareError: The drives may not be armed.
@@ -152,6 +158,7 @@ class Scene:
             header_of(self.robot, controller, CONTROL_RATE),
             clock=clock,
             realtime=realtime,
+            threaded=threaded,
         )
         memory = done.outcome.supervisor
         if Reason.OPERATOR_STOP in (memory.cause.reason, memory.stop_cause.reason):

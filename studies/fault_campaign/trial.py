@@ -147,7 +147,7 @@ def _hop(scene: Scene) -> Result:
     clock = StruckClock(lockstep, mishap.at, stall=mishap.stall, dies=mishap.dies)
     with tempfile.TemporaryDirectory() as folder:
         try:
-            done = scene.perform(lockstep.link, Path(folder), clock, realtime=False)
+            done = scene.perform(lockstep.link, Path(folder), clock, realtime=False, threaded=False)
         except HostDiedError:
             done = None
         finally:

@@ -100,11 +100,21 @@ class Disk:
         return self._write(file, bytes(data[:takes]))
 
 
+def test_without_a_thread_a_row_is_in_the_file_at_once(tmp_path):
+    box = FlightRecorder(tmp_path / "a.blackbox", COLUMNS, {}, threaded=False)
+    for tick in range(3):
+        box.row([float(tick), 0.0, 0.0])
+        assert len(read_recording(box.path)[1]) == tick + 1
+    box.close()
+    assert box.lost == 0
+
+
+@pytest.mark.parametrize("threaded", [True, False])
 def test_a_full_disk_never_stops_the_loop_and_once_there_is_room_nothing_is_missing(
-    tmp_path, monkeypatch
+    tmp_path, monkeypatch, threaded
 ):
     disk = Disk(monkeypatch)
-    box = FlightRecorder(tmp_path / "a.blackbox", COLUMNS, {})
+    box = FlightRecorder(tmp_path / "a.blackbox", COLUMNS, {}, threaded=threaded)
     for tick in range(300):
         disk.takes = {100: 7, 150: 0, 250: None}.get(tick, disk.takes)
         began = time.monotonic()

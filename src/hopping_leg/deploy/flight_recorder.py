@@ -40,12 +40,13 @@ _LARGEST = 1 << 24  # Content that no frame exceeds, bytes; a length beyond it i
 
 
 class FlightRecorder:
-    """Writes one run; rows and events never wait for the disk.
+    """Writes one run; rows and events never wait for the disk, unless time is virtual.
 
     Args:
         path: File to create; ends in ``SUFFIX``.
         columns: Names of the rows' values.
         header: Facts about the run, JSON.
+        threaded: Write in a thread; in virtual time, where nothing is late, it only costs time.
 
     Attributes:
         rows: How many were recorded.
@@ -56,7 +57,9 @@ class FlightRecorder:
         TraceError: The file exists or cannot be created.
     """
 
-    def __init__(self, path: Path, columns: Sequence[str], header: dict[str, Any]) -> None:
+    def __init__(
+        self, path: Path, columns: Sequence[str], header: dict[str, Any], *, threaded: bool = True
+    ) -> None:
         self.path, self.columns = path, tuple(columns)
         self.rows = self.lost = 0
         self.error: str | None = None
@@ -75,56 +78,70 @@ class FlightRecorder:
             os.close(self._file)
             path.unlink()
             raise errors.TraceError(f"Cannot write {path}: {error.strerror}.") from error
+        self._waiting: deque[bytes] = deque()
+        self._size = self._unsynced = self._begun = 0
         self._queue: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._write, name="black-box", daemon=True)
-        self._thread.start()
+        self._thread: threading.Thread | None = None
+        if threaded:
+            self._thread = threading.Thread(target=self._work, name="black-box", daemon=True)
+            self._thread.start()
 
     def row(self, values: Sequence[float]) -> None:
         """Record a tick; ``values`` are in the order of ``columns``."""
         self.rows += 1
-        self._queue.put(_frame(_ROW, self._row.pack(*values)))
+        self._put(_frame(_ROW, self._row.pack(*values)))
 
     def event(self, **facts: Any) -> None:  # noqa: ANN401
         """Record what happened beside the ticks, e.g. a transition with its reason."""
-        self._queue.put(_frame(_EVENT, json.dumps(facts).encode()))
+        self._put(_frame(_EVENT, json.dumps(facts).encode()))
 
     def close(self) -> None:
         """Write what is left and close the file."""
-        self._queue.put(None)
-        self._thread.join()
+        self._put(None)
+        if self._thread:
+            self._thread.join()
+        self.lost += len(self._waiting)
         os.close(self._file)
 
-    def _write(self) -> None:
-        """Write frames as they come; those that the disk refuses wait, in their order."""
-        waiting: deque[bytes] = deque()
-        size = unsynced = begun = 0
-        last = False
-        while not last:
-            frame = self._queue.get()
-            while frame is not None:
-                if size + len(frame) > _WAITING:
-                    self.lost += 1
-                else:
-                    waiting.append(frame)
-                    size += len(frame)
-                try:
-                    frame = self._queue.get_nowait()
-                except queue.Empty:
-                    break
-            last = frame is None
+    def _put(self, frame: bytes | None) -> None:
+        self._queue.put(frame)
+        if self._thread is None:
+            self._write()
+
+    def _work(self) -> None:
+        """Write frames as they come, until the last."""
+        while self._write():
+            pass
+
+    def _write(self) -> bool:
+        """Write what comes next, and all that waits; return whether there is more to come.
+
+        What the disk refuses waits, in its order.
+        """
+        frame = self._queue.get()
+        while frame is not None:
+            if self._size + len(frame) > _WAITING:
+                self.lost += 1
+            else:
+                self._waiting.append(frame)
+                self._size += len(frame)
             try:
-                while waiting:
-                    written = os.write(self._file, waiting[0][begun:])
-                    begun, size = begun + written, size - written
-                    if begun == len(waiting[0]):
-                        waiting.popleft()
-                        begun, unsynced = 0, unsynced + 1
-                if last or unsynced >= _SYNC_TICKS:
-                    os.fsync(self._file)
-                    unsynced = 0
-            except OSError as error:
-                self.error = f"{self.path}: {error.strerror}"
-        self.lost += len(waiting)
+                frame = self._queue.get_nowait()
+            except queue.Empty:
+                break
+        try:
+            while self._waiting:
+                written = os.write(self._file, self._waiting[0][self._begun :])
+                self._begun, self._size = self._begun + written, self._size - written
+                if self._begun == len(self._waiting[0]):
+                    self._waiting.popleft()
+                    self._begun, self._unsynced = 0, self._unsynced + 1
+            if frame is None or self._unsynced >= _SYNC_TICKS:
+                os.fsync(self._file)
+                self._unsynced = 0
+        except OSError as error:
+            self.error = f"{self.path}: {error.strerror}"
+        return frame is not None
 
 
 class FlightRecorderTail:

@@ -71,6 +71,7 @@ def perform(
     *,
     clock: Clock | None = None,
     realtime: bool = True,
+    threaded: bool = True,
     beside: Callable[[ControlLoop], AbstractContextManager[None]] = lambda _: nullcontext(),
 ) -> Performance:
     """Arm, run a sequence, stop; a signal stops it as the operator would, a second one ends it.
@@ -83,6 +84,7 @@ def perform(
         header: Header of the trace.
         clock: None takes the computer's.
         realtime: Ask for priority and locked memory.
+        threaded: Record in a thread, see ``FlightRecorder``.
         beside: Makes what is open while the loop runs, e.g. a keyboard that stops it.
 
     Raises:
@@ -90,7 +92,9 @@ def perform(
         HardwareError: The controller did not return, or a second signal ended the run.
     """
     recording = path.with_suffix(flight_recorder.SUFFIX)
-    recorder = flight_recorder.FlightRecorder(recording, columns(sequence.controller), header)
+    recorder = flight_recorder.FlightRecorder(
+        recording, columns(sequence.controller), header, threaded=threaded
+    )
     loop = ControlLoop(link, sequence, limits, recorder, clock or RealClock())
     notices: tuple[str, ...] = ()
     try:
