@@ -206,7 +206,8 @@ def transfer(study: Study, at_once: int) -> Row:
     Raises:
         UsageError: The folder holds results of other options, or there is no such recipe.
     """
-    rounds = (study.records(), study.fits(), study.trainings(), study.hops())
+    made = [*study.trainings(), *study.tunings()]
+    rounds = (study.records(), study.fits(), made, study.hops())
     work_through(rounds, at_once)
     meanings = {method.name: method.meaning for method in study.methods}
     trials = [row for hop in study.hops() for row in hop.rows()]
@@ -323,8 +324,8 @@ class Experiment:
     """What policies are trained on, the others being compared with the first; or what foretells.
     Valid: identified, cad, table-1, randomised, identified-surprises, cad-surprises (these three
     not to foretell), rail-only, fixed-base-only, two-pass, one-pass, truth; and, not trained,
-    energy-shaping, universal, universal-identified, mpc, mpc-identified. Default: the first four
-    and energy-shaping; or all that can foretell."""
+    energy-shaping, energy-shaping-tuned, universal, universal-identified, mpc, mpc-identified.
+    Default: the first four and energy-shaping; or all that can foretell."""
     seeds: tuple[int, ...] = (0,)
     """Seeds of the trainings, one of each method and twin each."""
     recipe: str = Study.recipe

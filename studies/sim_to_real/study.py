@@ -1,10 +1,13 @@
 """What a study was asked for, its jobs, and where policies are trained before they meet a twin."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
+from hopping_leg import io
+from hopping_leg.controllers.energy_shaping.tuning import Search as GainSearch
+from hopping_leg.controllers.energy_shaping.tuning import tune
 from hopping_leg.controllers.registry import ENERGY_SHAPING
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.identify import cost, optimizers, plan
@@ -13,7 +16,8 @@ from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import Rig
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes import Randomise, change, get_recipe, randomise
-from hopping_leg.robot import Robot
+from hopping_leg.robot import Robot, load_robot
+from hopping_leg.sim_to_real.jobs import StoredJob
 from hopping_leg.sim_to_real.transfer import (
     COMMANDS,
     RIGS,
@@ -60,6 +64,7 @@ class Method:
             what a perfect fit would find.
         untrained: Controller that hops as it is; empty where there is a training. It is told the
             robot that the fit gives, or else the one that the twin extends.
+        tuned: Whether the gains of an untrained energy shaping are searched anew on that robot.
     """
 
     name: str
@@ -69,6 +74,7 @@ class Method:
     ranges: Randomise = "none"
     truth: bool = False
     untrained: str = ""
+    tuned: bool = False
 
 
 METHODS = {
@@ -91,7 +97,14 @@ METHODS = {
         Method("two-pass", "the paper's two passes of CMA-ES", Fit("two-pass", search="two-pass")),
         Method("one-pass", "the same CMA-ES in one pass", Fit("one-pass", search="one-pass")),
         Method("truth", "true parameters: what a perfect fit would find", truth=True),
-        Method(ENERGY_SHAPING, "energy shaping, tuned, untouched", untrained=ENERGY_SHAPING),
+        Method(ENERGY_SHAPING, "energy shaping, shipped gains", untrained=ENERGY_SHAPING),
+        Method(
+            "energy-shaping-tuned",
+            "energy shaping, tuned on what both recordings identify",
+            Fit(),
+            untrained=ENERGY_SHAPING,
+            tuned=True,
+        ),
         Method("universal", "`universal`, told the CAD's robot", untrained="universal"),
         Method(
             "universal-identified",
@@ -182,6 +195,39 @@ class SearchTwin(IdentifyTwin):
 
 
 @dataclass(frozen=True)
+class TuneGains(StoredJob):
+    """Gains of energy shaping, tuned in the simulation of the robot ``source``."""
+
+    file: Path
+    source: str
+
+    weight: ClassVar[float] = 60.0
+
+    @property
+    def name(self) -> str:
+        """What is done."""
+        return f"tune {self.file.stem}"
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """Robot and search."""
+        return {"robot": load_robot(self.source).digest, **io.plain(asdict(_SEARCH))}
+
+    def run(self, *, quiet: bool) -> None:
+        """Search; a search that was killed goes on."""
+        folder = self.file.with_suffix("")
+        found = tune(
+            load_robot(self.source), self.source, ENERGY_SHAPING, _SEARCH, 0, folder,
+            lambda generations, lowest: None,
+        )  # fmt: skip
+        io.write_json(self.file.with_suffix(".json"), {"asked": self.asked, **found})
+        (folder / "gains.toml").replace(self.file)
+
+
+_SEARCH = GainSearch(threads=1)
+
+
+@dataclass(frozen=True)
 class Study:
     """Options and folder of a study."""
 
@@ -235,12 +281,17 @@ class Study:
 
     def hop(self, twin: Twin, method: Method, seed: int) -> HopTrial:
         """Return the trial of a method's policy on a twin."""
+        policy = None
+        if method.tuned:
+            policy = self._tuning(twin, method).file
+        elif not method.untrained:
+            policy = self.training(twin, method, seed).folder / "policy.onnx"
         return HopTrial(
             self.folder / "trials" / f"{twin.name}-{method.name}-seed{seed}.json",
             twin,
             method.name,
             seed,
-            None if method.untrained else self.training(twin, method, seed).folder / "policy.onnx",
+            policy,
             self.commands,
             self.repeats,
             method.untrained,
@@ -277,6 +328,15 @@ class Study:
         """Return all trainings; several twins may share one."""
         every = (self.training(t, m, s) for s, m, t in self._all() if not m.untrained)
         return list({training.folder: training for training in every}.values())
+
+    def tunings(self) -> list[TuneGains]:
+        """Return all searches of gains."""
+        tuned = (method for method in self.methods if method.tuned)
+        return [self._tuning(twin, method) for method in tuned for twin in self.twins]
+
+    def _tuning(self, twin: Twin, method: Method) -> TuneGains:
+        file = self.folder / "gains" / f"{twin.name}-{method.name}.toml"
+        return TuneGains(file, self.source(twin, method))
 
     def hops(self) -> list[HopTrial]:
         """Return all trials; what is not trained has one for each twin."""

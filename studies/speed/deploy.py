@@ -26,6 +26,7 @@ from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.hardware_trials import Performance, header_of, perform
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
+from hopping_leg.deploy.realtime import RealClock, keeping_time
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.transport import open_transport
 from hopping_leg.emulator.process import EmulatorProcess
@@ -125,7 +126,7 @@ class Deploy:
 
 
 def bench_deploy(study: Deploy, on_progress: Callable[[str], None]) -> dict[str, Any]:
-    """Measure ticks, wake-ups and heights.
+    """Measure wake-ups without and with a loop, ticks and heights.
 
     Args:
         study: What is measured.
@@ -140,6 +141,7 @@ def bench_deploy(study: Deploy, on_progress: Callable[[str], None]) -> dict[str,
         "controller": controller.name,
         "robot": robot.name,
         "rate_hz": CONTROL_RATE,
+        "bare_wake_late_us": _bare_wake_ups(study, on_progress),
         **_real_time(study, robot, on_progress),
         "heights": _heights(study, robot, on_progress),
         "host": host(),
@@ -148,6 +150,19 @@ def bench_deploy(study: Deploy, on_progress: Callable[[str], None]) -> dict[str,
         row = bench_inference([study.controller])["rows"][0]
         result["inference_us"] = {k: row[f"inference_{k}_us"] for k in ("median", "p99")}
     return result
+
+
+def _bare_wake_ups(study: Deploy, on_progress: Callable[[str], None]) -> dict[str, float]:
+    """Return how late the computer wakes a loop of the same rate and priority that does nothing."""
+    seconds = 6 * study.minutes
+    on_progress(f"{seconds:.0f} s of a loop that does nothing")
+    clock, late = RealClock(), []
+    with keeping_time(realtime=True):
+        due = clock.now()
+        for _ in range(round(seconds * CONTROL_RATE)):
+            due += 1 / CONTROL_RATE
+            late.append(clock.wait_until(due) - due)
+    return _percentiles(np.array(late))
 
 
 def _real_time(study: Deploy, robot: Robot, on_progress: Callable[[str], None]) -> dict[str, Any]:
@@ -273,9 +288,7 @@ def _ticks(traces: list[Trace]) -> dict[str, Any]:
 
     result: dict[str, Any] = {}
     for column, name in _COLUMNS.items():
-        values = 1e6 * pooled(column)
-        result[name] = {f"p{p:g}": float(np.percentile(values, p)) for p in _PERCENTILES}
-        result[name]["max"] = float(values.max())
+        result[name] = _percentiles(pooled(column))
     skipped = float(pooled("skipped_ticks").sum())
     on_time = int((pooled("tick_s") <= 1 / CONTROL_RATE).sum())
     ticks = len(pooled("tick_s"))
@@ -289,6 +302,13 @@ def _ticks(traces: list[Trace]) -> dict[str, Any]:
     }
 
 
+def _percentiles(seconds: Array) -> dict[str, float]:
+    """Return percentiles and maximum, us."""
+    values = 1e6 * seconds
+    found = {f"p{p:g}": float(np.percentile(values, p)) for p in _PERCENTILES}
+    return found | {"max": float(values.max())}
+
+
 def _median(values: list[float] | Array) -> float | None:
     return float(np.median(values)) if len(values) else None
 
@@ -300,7 +320,7 @@ def _folder() -> Iterator[Path]:
 
 
 def _print(console: Console, result: dict[str, Any]) -> None:
-    names = ("wake_late_us", "exchange_us", "control_us", "tick_us")
+    names = ("bare_wake_late_us", "wake_late_us", "exchange_us", "control_us", "tick_us")
     table = Table("us", *result["tick_us"])
     for name in names:
         cells = [f"{value:.0f}" for value in result[name].values()]

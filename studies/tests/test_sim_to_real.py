@@ -2,17 +2,20 @@
 
 import dataclasses
 import json
+from pathlib import Path
 
 import pytest
 from tests.sim_to_real.test_tables import trials
 
+from hopping_leg.controllers.energy_shaping.tuning import Search as GainSearch
 from hopping_leg.errors import RobotError, UsageError
-from hopping_leg.robot import load_robot
+from hopping_leg.robot import load_robot, load_tree, robot_text
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES
 from hopping_leg.sim_to_real.transfer import simulated
 
 pytest.importorskip("torch")
 from studies import shared
+from studies.sim_to_real import study as study_module
 from studies.sim_to_real.run import EFFECTS, Options, best_in_own_simulation, without
 from studies.sim_to_real.study import Study, choose_methods, find_twins
 
@@ -163,6 +166,22 @@ def test_energy_shaping_hops_without_a_training_once_per_twin(tmp_path):
     assert names == [f"twin-{t}-identified-seed{s}" for s in (0, 1) for t in (0, 1)]
     seeds = [(job.twin.name, job.seed) for job in one.hops() if job.policy is None]
     assert seeds == [("twin-0", 0), ("twin-1", 0)]
+
+
+def test_gains_are_tuned_on_what_was_identified_and_hop_on_the_twin(tmp_path, monkeypatch):
+    monkeypatch.setattr(study_module, "_SEARCH", GainSearch(1, 4, 3.0, threads=1))
+    one = study(tmp_path, ("energy-shaping", "energy-shaping-tuned"))
+    found = load_tree("legv2") | {"name": "found"}
+    for tuning in one.tunings():
+        file = Path(tuning.source)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(robot_text(found))
+        tuning.run(quiet=True)
+        assert tuning.done
+    trials = {job.method: job for job in one.hops() if job.twin.name == "twin-1"}
+    tuned = trials["energy-shaping-tuned"].controller
+    assert tuned.gains != trials["energy-shaping"].controller.gains
+    assert tuned.robot.name == "found"
 
 
 def test_of_several_trainings_the_better_one_is_chosen_in_its_own_simulation_alone(tmp_path):

@@ -34,10 +34,13 @@ def test_legs_of_a_training_can_be_and_follow_from_their_seeds():
     for seed, leg in enumerate(DRAWN):
         check_physics(leg.true, str(seed))
         assert leg == draw_any_leg(seed)
+        reality = leg.true.reality
         only = replace(
-            leg.true.reality, latency=Latency(), hip=NO_MISMATCH.hip, knee=NO_MISMATCH.knee
+            reality, latency=Latency(), hip=NO_MISMATCH.hip, knee=NO_MISMATCH.knee, voltage=1.0
         )
         assert only == NO_MISMATCH
+        for drive in (reality.hip, reality.knee):
+            assert drive.stiffness is not None or drive.backlash == 0
     robots = [leg.true for leg in DRAWN]
     legs = LegSimulator(LEG, len(robots), timestep=5e-4, robots=robots)
     legs.place(slice(None), 0.5, np.array([0.6, -1.2]))
@@ -45,6 +48,18 @@ def test_legs_of_a_training_can_be_and_follow_from_their_seeds():
         legs.step(np.zeros((len(robots), 2)))
     assert np.isfinite(legs.state).all()
     assert np.abs(legs.qd).max() < 100
+
+
+def test_some_legs_of_a_training_are_worn_empty_or_noisy():
+    true = [leg.true for leg in DRAWN]
+    rare = {
+        "friction": [leg.knee.friction > 0.8 for leg in true],
+        "play": [leg.reality.knee.backlash > 0.01 for leg in true],
+        "battery": [leg.reality.voltage < 0.8 for leg in true],
+        "noise": [leg.reality.hip.sensor.position_noise > 0 for leg in true],
+    }
+    shares = {name: np.mean(found) for name, found in rare.items()}
+    assert all(0.02 < share < 0.3 for share in shares.values()), shares
 
 
 def test_what_is_told_leaves_out_gains_delay_and_transmission():

@@ -82,8 +82,8 @@ def _difference(told: Robot, true: Robot) -> Array:
             math.log(true.contact.time_constant / 0.03),
             10 * true.rail.friction / (true.mass * GRAVITY),
             true.reality.latency.command / 0.005,
-            10 * true.hip.friction / moment,
-            10 * true.knee.friction / moment,
+            2 * math.log1p(5 * true.hip.friction / moment),
+            2 * math.log1p(5 * true.knee.friction / moment),
             10 * moment / stiffness if stiffness else 0.0,
         ]
     )

@@ -2,8 +2,8 @@
 
 A leg is leg V2 with other links, masses, motors and gears. What its file says of friction, inertia,
 rail and ground may be a guess as good as a CAD's, or identified; payload, gains of the motors,
-delay and transmission it never says. Ranges are leg V2's; numbers with units grow with another
-leg's length and mass, gravity staying the same.
+delay, transmission, voltage and noise it never says. Ranges are leg V2's; numbers with units grow
+with another leg's length and mass, gravity staying the same.
 """
 
 import math
@@ -57,9 +57,9 @@ FRICTION = (
     Range("knee.damping", "N m s/rad", 8e-3, 0.2, "[C]", "logarithmic"),
 )
 
-RUBBING = (
-    Range("hip.friction", "N m", 0.0, 0.6, "[C] to above Table I"),
-    Range("knee.friction", "N m", 0.0, 0.35, "[C] to above the recordings"),
+RUBBING = tuple(
+    Range(f"{joint}.friction", "N m", 0.05, 4.0, "[C] to far above Table I", "logarithmic")
+    for joint in JOINTS
 )
 
 INERTIA = (
@@ -94,6 +94,24 @@ TRANSMISSIONS = (
     Range("reality.knee.backlash", "rad", 0.0, 5e-3, "[C]"),
 )
 
+WORN = (
+    Range("reality.hip.backlash", "rad", 4e-3, 0.2, "[C]", "logarithmic"),
+    Range("reality.knee.backlash", "rad", 2e-3, 0.2, "[C]", "logarithmic"),
+)
+"""Backlash of some of these."""
+
+EMPTY = (Range("reality.voltage", "1", 0.4, 1.0, "[C] to below an empty battery"),)
+
+NOISES = tuple(
+    Range(f"reality.{joint}.sensor.{kind}_noise", unit, low, high, "[C]", "logarithmic")
+    for joint in JOINTS
+    for kind, unit, low, high in (
+        ("position", "rad", 5e-3, 0.4),
+        ("velocity", "rad/s", 0.05, 4.0),
+    )
+)
+"""On top of the paper's."""
+
 _SHAPE, _TORQUE, _SPEED, _GEAR = (0.8, 1.25), (0.75, 1.5), (0.9, 1.5), (0.6, 1.6)
 """Over leg V2's, scaled: centres of mass and inertias, torques, no-load speeds, armatures."""
 
@@ -103,14 +121,17 @@ _WEAKEST, _STRONGEST = 0.4, 3.0  # weight times length over leg V2's that motors
 _SCALED = 0.5  # of another size than leg V2
 _PLAIN = 0.15  # as designed, but for gains, delay and transmission
 _FITTED = ("legv2-identified", "legv2-paper")
-_SHIPPED = (BASE, BASE, *_FITTED)  # designs of the others
+_SHIPPED = (BASE, BASE, *_FITTED, "legv1")  # designs of the others
 _RUBBING = 0.3  # with more friction in their joints than most
 _SMALL = 0.1  # with an armature below that of rotor and gear
 _IDENTIFIED = 0.5  # told as a fit would tell them
 _EXACT = 0.2  # whose motors give what is asked for
 _PUNCTUAL, _SOON = 0.15, 0.5  # without delay, and late by less than a control period
 _ELASTIC = 0.6
+_WORN = 0.2  # of the elastic ones
+_EMPTY = 0.2
 _DISTURBED = 0.5  # that meet the paper's noise and delay
+_NOISY = 0.15  # that have noise of their own
 
 _LEAST_ARMATURE = 1e-3
 """Behind which there may be an elastic transmission, on a leg of leg V2's size, kg m2."""
@@ -184,6 +205,12 @@ def draw_any_leg(seed: int) -> AnyLeg:
     )
     if rng.random() < _ELASTIC and heavy:
         true = _soft_enough(_draw(true, TRANSMISSIONS, rng))
+        if rng.random() < _WORN:
+            true = _draw(true, WORN, rng)
+    if rng.random() < _EMPTY:
+        true = _draw(true, EMPTY, rng)
+    if rng.random() < _NOISY:
+        true = _draw(true, NOISES, rng)
     return AnyLeg(believed, true, bool(rng.random() < _DISTURBED))
 
 

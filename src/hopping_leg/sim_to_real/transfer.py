@@ -61,7 +61,7 @@ _INERTIA_FACTOR = 10.0
 MEANINGS = {
     "identified": "identified from both recordings",
     "cad": "CAD defaults",
-    ENERGY_SHAPING: "energy shaping, tuned, untouched",
+    ENERGY_SHAPING: "energy shaping, shipped gains",
 }
 """What a controller is trained on before it meets the twin, by the method's name."""
 

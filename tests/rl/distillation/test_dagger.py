@@ -181,6 +181,24 @@ def test_a_push_counts_more_and_what_is_hidden_is_guessed():
     assert (hidden[:, OF_MOTION:].std(axis=0) > 0).any()
 
 
+def test_some_bases_are_pushed_for_single_control_periods_unseen_by_the_teacher():
+    recipe = TINY_FAST.replace(num_envs=128, impulse=0.5, buffer_size=128 * 16)
+    made = learner(recipe)
+    legs, teach, forces = made.task.legs, made._teach, []
+    made._teach = lambda: (np.testing.assert_equal(legs._push, 0.0), teach())[1]
+    push = legs.push
+    legs.push = lambda force: (forces.append(force.copy()), push(force))
+    for _ in range(200):
+        made._step()
+    pushed = np.array(forces[::2])
+    impulses, often = pushed / made.task.options.rate, (pushed != 0).mean(axis=0)
+    most = 0.5 * ROBOT.mass * np.sqrt(9.81 * (ROBOT.thigh.length + ROBOT.shank.length))
+    assert 0.7 * most < np.abs(impulses).max() <= 1.01 * most
+    assert impulses.min() < 0 < impulses.max()
+    assert 0 < (often > 0).mean() < 0.6
+    assert often.max() < 0.04
+
+
 def test_the_student_comes_nearer_to_its_teacher():
     made = learn(learner(TINY_FAST), TINY_FAST.schedule.steps)
     losses = [made._gradient_step() for _ in range(200)]

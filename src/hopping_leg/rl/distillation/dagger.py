@@ -20,6 +20,7 @@ from stable_baselines3.common.logger import Logger
 from torch.nn import functional
 
 from hopping_leg.arrays import Array, Array32, BoolArray
+from hopping_leg.controllers import robot_numbers
 from hopping_leg.controllers.mpc import HopShape, Planning, TrueStateMpc
 from hopping_leg.envs.hidden_state import HiddenState
 from hopping_leg.envs.task import HoppingTask
@@ -29,7 +30,11 @@ from hopping_leg.rl.distillation.students import Student, StudentConfig
 from hopping_leg.rl.learner import RecentHops
 from hopping_leg.rl.onnx_export import Network
 from hopping_leg.rl.resumable import load_optimizer, to_numpy, to_torch
+from hopping_leg.robot import GRAVITY
 from hopping_leg.sim import LegSimulator
+
+_PUSHED, _PUSHES = 0.25, 0.5
+"""Share of the environments that push the base, and how often these do, 1/s."""
 
 _HELD_SECONDS = (0.2, 1.5)
 _HELD_STIFFNESS, _HELD_DAMPING = 2.0, 0.05
@@ -99,6 +104,9 @@ class DaggerConfig:
     """How much one counts in which it has to fold on the ground: to hop from rest, to leave it."""
     held_share: float = 0.0
     """Share of episodes that begin with a stiff leg for a while, so that it stands still."""
+    impulse: float = 0.0
+    """Largest impulse on the base, up or down, in a control period now and then, over the leg's
+    mass times sqrt(g L); some of the environments have them."""
     outlier: float = 0.0
     """Difference of actions beyond which the loss grows linearly (Huber); 0 for none."""
     hidden_weight: float = 0.0
@@ -153,7 +161,15 @@ class Dagger:
         self._draws = torch.Generator().manual_seed(seed)
         self._mixing = np.random.default_rng([seed, 1])
         self._left = 1.0
+        self._most_force = self._most_forces() if config.impulse else np.zeros(task.count)
         self._begin(task.reset())
+
+    def _most_forces(self) -> Array:
+        """Return the largest force on each base, N, (n,), 0 for most."""
+        legs = [leg.true for leg in self.task.task_legs] or [self.task.robot]
+        momentum = [leg.mass * math.sqrt(GRAVITY * robot_numbers.leg_length(leg)) for leg in legs]
+        pushed = self._mixing.random(self.task.count) < _PUSHED
+        return pushed * np.array(momentum) * self.config.impulse * self.task.options.rate
 
     def _begin(self, observation: Any) -> None:  # noqa: ANN401
         self.teacher.reset(self.task.count)
@@ -213,7 +229,9 @@ class Dagger:
             fresh = torch.from_numpy(~begun)[:, None]
             action, self._memory = self._actor(torch.from_numpy(seen), self._memory * fresh)
         taught = self._mixing.random(len(begun)) < self.mixing
+        self._push_bases()
         step = self.task.step(self._hold(np.where(taught[:, None], label, action.numpy())))
+        self.task.legs.push(np.zeros(self.task.count))
         self.recent_hops.add(step.apex_error)
         if self._hidden:
             self._hidden.update(step.apex_error, step.terminated | step.truncated)
@@ -225,6 +243,13 @@ class Dagger:
         config, teacher = self.config, self.teacher
         weight = np.where(teacher.pushing, config.push_weight, 1.0)
         return np.where(teacher.folding, config.fold_weight, weight).astype(np.float32)
+
+    def _push_bases(self) -> None:
+        """Push some bases for this control period."""
+        if self.config.impulse:
+            count, rate = self.task.count, self.task.options.rate
+            now = self._mixing.random(count) < _PUSHES / rate
+            self.task.legs.push(self._most_force * self._mixing.uniform(-1, 1, count) * now)
 
     def _hold(self, action: Array) -> Array:
         """Return what is commanded: at the start of some episodes, the posture that they have."""

@@ -2,9 +2,9 @@
 
 A recurrent student imitates ``mpc-true-state``, which knows state and parameters of every leg, on
 as many drawn legs as there are environments. It is told what a robot file tells. Payload, gains,
-delay and transmission, and friction, inertia and ground where the file is wrong, it has to infer
-from what its torques did; so that it does, it has to guess them and how far its hops miss. What is
-left of a miss corrects its command.
+delay, transmission and voltage, and friction, inertia and ground where the file is wrong, it has to
+infer from what its torques did; so that it does, it has to guess them and how far its hops miss.
+What is left of a miss corrects its command. Some of the legs are pushed.
 """
 
 from dataclasses import replace
@@ -37,9 +37,10 @@ UNIVERSAL = recipe.Recipe(
         push_weight=6.0,
         fold_weight=10.0,
         held_share=0.3,
+        impulse=0.5,
         outlier=0.15,
         hidden_weight=0.3,
-        teacher=HopShape(fold=-0.4),
+        teacher=HopShape(fold=-0.4, knee_gap=0.06),
         planning=Planning(
             timestep=1.25e-3, elastic_timestep=5e-4, simulations=3, tolerance=3e-4, every=2
         ),
