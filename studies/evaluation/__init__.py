@@ -41,7 +41,7 @@ _ELSEWHERE = ("legv2", "legv2-paper")
 
 RESULTS = (
     _trials(
-        f"fast precise {_BASELINES} energy-shaping-literal", "evaluation.json",
+        f"fast precise universal {_BASELINES} energy-shaping-literal", "evaluation.json",
         "--seeds 10 --floor soft --traces runs/results/traces",
     ),
     "hop report figures runs/results/traces/*.parquet --out studies/evaluation/figures",
@@ -51,16 +51,12 @@ RESULTS = (
     _precise("precise", "precise_fine_step", "--timestep 3.125e-05"),
     _precise("precise", "precise_no_soft_limits", "--no-soft-limits"),
     *(command for robot in _ELSEWHERE for command in _other(robot)),
-    f"hop robustness fast precise {_BASELINES} energy-shaping-literal --seeds 3 --out "
+    f"hop robustness fast precise universal {_BASELINES} energy-shaping-literal --seeds 3 --out "
     "runs/results/robustness --json studies/evaluation/results/robustness.json",
     "cp runs/results/robustness/robustness.svg studies/evaluation/figures",
     f"hop robustness paper {_BASELINES} --seeds 3 --out runs/results/paper_robustness --json "
     "studies/evaluation/results/paper_robustness.json",
-    f"hop robustness universal {_BASELINES} --seeds 3 --out runs/results/universal_robustness "
-    "--json studies/evaluation/results/universal_robustness.json",
-    "hop skills universal energy-shaping --floor soft --json "
-    "studies/evaluation/results/universal_skills.json",
-    "hop skills fast precise energy-shaping --floor soft --json "
+    "hop skills fast precise universal energy-shaping --floor soft --json "
     "studies/evaluation/results/skills.json",
     "hop skills paper energy-shaping --json studies/evaluation/results/paper_skills.json",
 )  # fmt: skip

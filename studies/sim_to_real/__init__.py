@@ -28,8 +28,8 @@ RESULTS = (
     "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping "
     "--folder runs/legs --jobs 2 --out runs/zero-shot-legs "
     "--json studies/sim_to_real/results/zero_shot_legs.json",
-    "python -m studies.sim_to_real transfer "
-    "--methods universal-identified universal energy-shaping --jobs 2 "
+    "python -m studies.sim_to_real transfer --methods universal-identified universal "
+    "energy-shaping energy-shaping-tuned mpc-identified --jobs 2 "
     "--folder runs/transfer-universal --json studies/sim_to_real/results/universal.json",
     "python -m studies.sim_to_real transfer --jobs 2 --folder runs/transfer-fast --json "
     "studies/sim_to_real/results/fast.json",

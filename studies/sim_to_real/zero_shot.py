@@ -236,7 +236,7 @@ class ZeroShot:
         sources = self._sources()
         jobs = [
             ZeroShotTrial(
-                self.out / "trials" / f"{Path(source).stem}-{Path(name).stem}.json",
+                self.out / "trials" / f"{Path(source).stem}-{io.safe_file_name(name)}.json",
                 source, name, self.commands, self.seconds,
             )
             for source in sources

@@ -118,7 +118,7 @@ _SHAPE, _TORQUE, _SPEED, _GEAR = (0.8, 1.25), (0.75, 1.5), (0.9, 1.5), (0.6, 1.6
 _WEAKEST, _STRONGEST = 0.4, 3.0  # weight times length over leg V2's that motors are sized for
 
 # Shares of the legs of a training.
-_SCALED = 0.5  # of another size than leg V2
+_SCALED = 0.55  # of another size than leg V2
 _PLAIN = 0.15  # as designed, but for gains, delay and transmission
 _FITTED = ("legv2-identified", "legv2-paper")
 _SHIPPED = (BASE, BASE, *_FITTED, "legv1")  # designs of the others
@@ -129,9 +129,9 @@ _EXACT = 0.2  # whose motors give what is asked for
 _PUNCTUAL, _SOON = 0.15, 0.5  # without delay, and late by less than a control period
 _ELASTIC = 0.6
 _WORN = 0.2  # of the elastic ones
-_EMPTY = 0.2
+_EMPTY = 0.1
 _DISTURBED = 0.5  # that meet the paper's noise and delay
-_NOISY = 0.15  # that have noise of their own
+_NOISY = 0.1  # that have noise of their own
 
 _LEAST_ARMATURE = 1e-3
 """Behind which there may be an elastic transmission, on a leg of leg V2's size, kg m2."""

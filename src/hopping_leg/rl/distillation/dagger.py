@@ -33,7 +33,7 @@ from hopping_leg.rl.resumable import load_optimizer, to_numpy, to_torch
 from hopping_leg.robot import GRAVITY
 from hopping_leg.sim import LegSimulator
 
-_PUSHED, _PUSHES = 0.25, 0.5
+_PUSHED, _PUSHES = 0.15, 0.5
 """Share of the environments that push the base, and how often these do, 1/s."""
 
 _HELD_SECONDS = (0.2, 1.5)
@@ -169,7 +169,8 @@ class Dagger:
         legs = [leg.true for leg in self.task.task_legs] or [self.task.robot]
         momentum = [leg.mass * math.sqrt(GRAVITY * robot_numbers.leg_length(leg)) for leg in legs]
         pushed = self._mixing.random(self.task.count) < _PUSHED
-        return pushed * np.array(momentum) * self.config.impulse * self.task.options.rate
+        most = self.config.impulse * self.task.options.rate * np.array(momentum)
+        return np.where(pushed, most, 0.0)
 
     def _begin(self, observation: Any) -> None:  # noqa: ANN401
         self.teacher.reset(self.task.count)

@@ -46,7 +46,7 @@ UNIVERSAL = recipe.Recipe(
         ),
     ),
     network=StudentConfig(memory="gru", hidden=(192,), size=192, update_every=4, correction=0.01),
-    schedule=recipe.Schedule(num_envs=1024, steps=50_000_000, log_every=8),
+    schedule=recipe.Schedule(num_envs=1024, steps=75_000_000, log_every=8),
     selection=recipe.SelectionConfig(
         eval_every=10**9,
         eval_commands=(0.22, 0.26, 0.30, 0.34, 0.38, 0.40),
