@@ -169,7 +169,7 @@ class Dagger:
         legs = [leg.true for leg in self.task.task_legs] or [self.task.robot]
         momentum = [leg.mass * math.sqrt(GRAVITY * robot_numbers.leg_length(leg)) for leg in legs]
         pushed = self._mixing.random(self.task.count) < _PUSHED
-        most = self.config.impulse * self.task.options.rate * np.array(momentum)
+        most = np.array(momentum) * self.config.impulse * self.task.options.rate
         return np.where(pushed, most, 0.0)
 
     def _begin(self, observation: Any) -> None:  # noqa: ANN401
