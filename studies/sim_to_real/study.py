@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from hopping_leg import io
+from hopping_leg.controllers.energy_shaping.gains import load_gains
 from hopping_leg.controllers.energy_shaping.tuning import Search as GainSearch
 from hopping_leg.controllers.energy_shaping.tuning import tune
 from hopping_leg.controllers.registry import ENERGY_SHAPING
@@ -194,6 +195,9 @@ class SearchTwin(IdentifyTwin):
         )
 
 
+_SEARCH = GainSearch(threads=1)
+
+
 @dataclass(frozen=True)
 class TuneGains(StoredJob):
     """Gains of energy shaping, tuned in the simulation of the robot ``source``."""
@@ -210,8 +214,12 @@ class TuneGains(StoredJob):
 
     @property
     def asked(self) -> dict[str, Any]:
-        """Robot and search."""
-        return {"robot": load_robot(self.source).digest, **io.plain(asdict(_SEARCH))}
+        """Robot, first gains and search."""
+        return {
+            "robot": load_robot(self.source).digest,
+            "start": asdict(load_gains(ENERGY_SHAPING).gains),
+            **io.plain(asdict(_SEARCH)),
+        }
 
     def run(self, *, quiet: bool) -> None:
         """Search; a search that was killed goes on."""
@@ -222,9 +230,6 @@ class TuneGains(StoredJob):
         )  # fmt: skip
         io.write_json(self.file.with_suffix(".json"), {"asked": self.asked, **found})
         (folder / "gains.toml").replace(self.file)
-
-
-_SEARCH = GainSearch(threads=1)
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,9 @@
 """Legs of any size: robot files of legs that nobody built, and what such a leg may really be.
 
-A leg is leg V2 with other links, masses, motors and gears. What its file says of friction, inertia,
-rail and ground may be a guess as good as a CAD's, or identified; payload, gains of the motors,
-delay, transmission, voltage and noise it never says. Ranges are leg V2's; numbers with units grow
-with another leg's length and mass, gravity staying the same.
+A leg is a shipped one, or leg V2 with other links, masses, motors and gears. What its file says of
+friction, inertia, rail and ground may be a guess as good as a CAD's, or identified; payload, gains
+of the motors, delay, transmission, voltage and noise it never says. Ranges are leg V2's; numbers
+with units grow with another leg's length and mass, gravity staying the same.
 """
 
 import math
@@ -61,6 +61,7 @@ RUBBING = tuple(
     Range(f"{joint}.friction", "N m", 0.05, 4.0, "[C] to far above Table I", "logarithmic")
     for joint in JOINTS
 )
+"""Friction of joints that rub more than any fit has found."""
 
 INERTIA = (
     _factor("thigh.inertia", 0.8, 3.6),
@@ -98,7 +99,7 @@ WORN = (
     Range("reality.hip.backlash", "rad", 4e-3, 0.2, "[C]", "logarithmic"),
     Range("reality.knee.backlash", "rad", 2e-3, 0.2, "[C]", "logarithmic"),
 )
-"""Backlash of some of these."""
+"""Backlash of worn transmissions."""
 
 EMPTY = (Range("reality.voltage", "1", 0.4, 1.0, "[C] to below an empty battery"),)
 

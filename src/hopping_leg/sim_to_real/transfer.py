@@ -327,7 +327,7 @@ class HopTrial(StoredJob):
         file: Where what was measured is kept.
         method: Name of what it was trained on.
         seed: Seed of its training.
-        policy: Trained policy; None takes an untrained controller.
+        policy: Trained policy or gain file; None takes an untrained controller.
         untrained: Name of that; the default is energy shaping, tuned on the believed leg.
         told: Name or file of the robot that the controller is told; empty for the believed one.
     """

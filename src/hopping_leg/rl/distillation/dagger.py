@@ -23,7 +23,7 @@ from hopping_leg.arrays import Array, Array32, BoolArray
 from hopping_leg.controllers import robot_numbers
 from hopping_leg.controllers.mpc import HopShape, Planning, TrueStateMpc
 from hopping_leg.envs.hidden_state import HiddenState
-from hopping_leg.envs.task import HoppingTask
+from hopping_leg.envs.task import HoppingTask, Step
 from hopping_leg.rl.checkpoint import Tree
 from hopping_leg.rl.distillation.buffer import LabelledRollout, RolloutBuffer
 from hopping_leg.rl.distillation.students import Student, StudentConfig
@@ -161,7 +161,7 @@ class Dagger:
         self._draws = torch.Generator().manual_seed(seed)
         self._mixing = np.random.default_rng([seed, 1])
         self._left = 1.0
-        self._most_force = self._most_forces() if config.impulse else np.zeros(task.count)
+        self._most_force = self._most_forces() if config.impulse else None
         self._begin(task.reset())
 
     def _most_forces(self) -> Array:
@@ -230,9 +230,7 @@ class Dagger:
             fresh = torch.from_numpy(~begun)[:, None]
             action, self._memory = self._actor(torch.from_numpy(seen), self._memory * fresh)
         taught = self._mixing.random(len(begun)) < self.mixing
-        self._push_bases()
-        step = self.task.step(self._hold(np.where(taught[:, None], label, action.numpy())))
-        self.task.legs.push(np.zeros(self.task.count))
+        step = self._act(np.where(taught[:, None], label, action.numpy()))
         self.recent_hops.add(step.apex_error)
         if self._hidden:
             self._hidden.update(step.apex_error, step.terminated | step.truncated)
@@ -245,12 +243,16 @@ class Dagger:
         weight = np.where(teacher.pushing, config.push_weight, 1.0)
         return np.where(teacher.folding, config.fold_weight, weight).astype(np.float32)
 
-    def _push_bases(self) -> None:
-        """Push some bases for this control period."""
-        if self.config.impulse:
-            count, rate = self.task.count, self.task.options.rate
-            now = self._mixing.random(count) < _PUSHES / rate
-            self.task.legs.push(self._most_force * self._mixing.uniform(-1, 1, count) * now)
+    def _act(self, action: Array) -> Step:
+        """Act for a control period, in which some legs are held and some bases are pushed."""
+        task, most = self.task, self._most_force
+        if most is None:
+            return task.step(self._hold(action))
+        now = self._mixing.random(task.count) < _PUSHES / task.options.rate
+        task.legs.push(most * self._mixing.uniform(-1, 1, task.count) * now)
+        step = task.step(self._hold(action))
+        task.legs.push(np.zeros(task.count))
+        return step
 
     def _hold(self, action: Array) -> Array:
         """Return what is commanded: at the start of some episodes, the posture that they have."""
