@@ -19,12 +19,12 @@ Examples:
 
 RESULTS = (
     "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping --twins 100 "
-    "--seed 3000 --jobs 2 --out runs/zero-shot-twins "
+    "--seed 6000 --jobs 2 --out runs/zero-shot-twins "
     "--json studies/sim_to_real/results/zero_shot_twins.json",
     "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping mpc --twins 20 "
-    "--seed 3000 --commands 0.22,0.28,0.34,0.40 --jobs 2 --out runs/zero-shot-mpc "
+    "--seed 6000 --commands 0.22,0.28,0.34,0.40 --jobs 2 --out runs/zero-shot-mpc "
     "--json studies/sim_to_real/results/zero_shot_mpc.json",
-    "hop robots draw legs --count 50 --seed 3000 --out runs/legs && "
+    "hop robots draw legs --count 50 --seed 6000 --out runs/legs && "
     "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping "
     "--folder runs/legs --jobs 2 --out runs/zero-shot-legs "
     "--json studies/sim_to_real/results/zero_shot_legs.json",
