@@ -24,6 +24,12 @@ RESULTS = (
     "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping mpc --twins 20 "
     "--seed 6000 --commands 0.22,0.28,0.34,0.40 --jobs 2 --out runs/zero-shot-mpc "
     "--json studies/sim_to_real/results/zero_shot_mpc.json",
+    "python -m studies.time_to_accuracy --recipes universal --seeds 0 1 2 && "
+    "python -m studies.sim_to_real zero-shot --controllers universal "
+    "runs/time_to_accuracy/universal-1/1/policy.onnx "
+    "runs/time_to_accuracy/universal-2/1/policy.onnx energy-shaping --twins 20 --seed 7000 "
+    "--jobs 2 --out runs/zero-shot-seeds "
+    "--json studies/sim_to_real/results/zero_shot_seeds.json",
     "hop robots draw legs --count 50 --seed 6000 --out runs/legs && "
     "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping "
     "--folder runs/legs --jobs 2 --out runs/zero-shot-legs "
@@ -31,7 +37,8 @@ RESULTS = (
     "python -m studies.sim_to_real transfer --methods universal-identified universal "
     "energy-shaping energy-shaping-tuned --jobs 2 "
     "--folder runs/transfer-universal --json studies/sim_to_real/results/universal.json",
-    "python -m studies.sim_to_real transfer --jobs 2 --folder runs/transfer-fast --json "
+    "python -m studies.sim_to_real transfer --methods identified identified-posterior cad table-1 "
+    "randomised energy-shaping --jobs 2 --folder runs/transfer-fast --json "
     "studies/sim_to_real/results/fast.json",
     "python -m studies.sim_to_real prediction --twins 5 --jobs 2 --json "
     "studies/sim_to_real/results/prediction.json",
@@ -56,6 +63,7 @@ ZERO_SHOT = (
 TABLES = (
     ("table", "zero_shot_twins.json", "summary", *ZERO_SHOT),
     ("table", "zero_shot_mpc.json", "summary", *ZERO_SHOT),
+    ("table", "zero_shot_seeds.json", "summary", *ZERO_SHOT),
     ("table", "zero_shot_legs.json", "summary", *ZERO_SHOT),
     *(
         part

@@ -322,10 +322,11 @@ class Experiment:
     twins need 20."""
     methods: tuple[str, ...] | None = None
     """What policies are trained on, the others being compared with the first; or what foretells.
-    Valid: identified, cad, table-1, randomised, identified-surprises, cad-surprises (these three
-    not to foretell), rail-only, fixed-base-only, two-pass, one-pass, truth; and, not trained,
-    energy-shaping, energy-shaping-tuned, universal, universal-identified, mpc, mpc-identified.
-    Default: the first four and energy-shaping; or all that can foretell."""
+    Valid: identified, cad, table-1, rail-only, fixed-base-only, two-pass, one-pass, truth; not to
+    foretell, as each leg in training differs, identified-posterior, randomised,
+    identified-surprises, cad-surprises; and, not trained, energy-shaping, energy-shaping-tuned,
+    universal, universal-identified, mpc, mpc-identified.
+    Default: identified, cad, table-1, randomised and energy-shaping; or all that can foretell."""
     seeds: tuple[int, ...] = (0,)
     """Seeds of the trainings, one of each method and twin each."""
     recipe: str = Study.recipe

@@ -15,7 +15,6 @@ from hopping_leg.identify import cost, optimizers, plan
 from hopping_leg.identify.pipeline import IdentifyOptions
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import Rig
-from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes import Randomise, change, get_recipe, randomise
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim_to_real.jobs import StoredJob
@@ -60,7 +59,8 @@ class Method:
         meaning: A phrase for tables.
         fit: How the twin is identified; None if it is not.
         robot: Robot that is trained on without a fit; None takes the one that the twin extends.
-        ranges: What every leg in training draws for itself, around the robot.
+        ranges: What every leg in training draws for itself, around the robot; ``intervals`` of
+            the fit, or those of ``hop train``.
         truth: Whether the twin's own file is the robot, [reality] left out but for the delay:
             what a perfect fit would find.
         untrained: Controller that hops as it is; empty where there is a training. It is told the
@@ -72,7 +72,7 @@ class Method:
     meaning: str
     fit: Fit | None = None
     robot: str | None = None
-    ranges: Randomise = "none"
+    ranges: Randomise | Literal["intervals"] = "none"
     truth: bool = False
     untrained: str = ""
     tuned: bool = False
@@ -82,6 +82,12 @@ METHODS = {
     method.name: method
     for method in (
         Method("identified", "identified from both recordings", Fit()),
+        Method(
+            "identified-posterior",
+            "identified, every leg drawn from the intervals of the fit",
+            Fit(),
+            ranges="intervals",
+        ),
         Method("cad", "CAD defaults"),
         Method("table-1", "the paper's Table I", robot="legv2-paper"),
         Method("randomised", "domain randomisation over the twins' ranges", ranges="twins"),
@@ -282,7 +288,11 @@ class Study:
             name = Path(self.source(twin, method)).stem
             name += "" if method.ranges == "none" else f"-{method.ranges}"
         folder = self.folder / "training" / f"{name}-seed{seed}"
-        return TrainPolicy(folder, self.source(twin, method), self._recipe(method), seed)
+        recipe = change(get_recipe(self.recipe), [*self.changes, f"steps={self.steps}"])
+        if method.ranges == "intervals":
+            return TrainPolicy(folder, self.source(twin, method), recipe, seed, intervals=True)
+        recipe = randomise(recipe, method.ranges)
+        return TrainPolicy(folder, self.source(twin, method), recipe, seed)
 
     def hop(self, twin: Twin, method: Method, seed: int) -> HopTrial:
         """Return the trial of a method's policy on a twin."""
@@ -350,10 +360,6 @@ class Study:
 
     def _all(self) -> Iterable[tuple[int, Method, Twin]]:
         return ((s, m, t) for s in self.seeds for m in self.methods for t in self.twins)
-
-    def _recipe(self, method: Method) -> Recipe:
-        recipe = change(get_recipe(self.recipe), [*self.changes, f"steps={self.steps}"])
-        return randomise(recipe, method.ranges)
 
     def _recording(self, twin: Twin, rig: Rig) -> Path:
         return self.folder / "recordings" / f"{twin.name}-{rig}.parquet"

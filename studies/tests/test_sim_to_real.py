@@ -117,6 +117,25 @@ def test_no_method_but_the_truth_trains_on_what_the_twin_alone_knows(tmp_path):
     assert [job.name for job in one.fits()] == [f"identify {t.name}, identified" for t in one.twins]
 
 
+def test_legs_are_drawn_from_the_intervals_of_the_fit(tmp_path):
+    one = study(tmp_path, ("identified-posterior",))
+    training = one.trainings()[0]
+    told = {"unit": "", "bound_low": 0.0, "bound_high": 2.0}
+    rows = [
+        {"name": "hip.friction", "interval_low": 0.1, "interval_high": 0.2, **told},
+        {"name": "rail.friction", "interval_low": None, "interval_high": None, **told},
+        {"name": "drive.delay", "interval_low": 0.0, "interval_high": 0.1, **told},
+    ]
+    fit = Path(training.source)
+    fit.parent.mkdir(parents=True)
+    fit.with_suffix(".json").write_text(json.dumps({"parameters": rows}))
+    ranges = training.trained.task.randomised
+    assert [(r.path, r.low, r.high) for r in ranges] == [
+        ("hip.friction", 0.1, 0.2),
+        ("rail.friction", 0.0, 2.0),
+    ]
+
+
 def test_a_search_belongs_to_its_fit(tmp_path, monkeypatch):
     one = study(tmp_path, ("identified", "two-pass"), generations=7)
     for fit in one.fits():

@@ -2,18 +2,22 @@
 
 _RESULTS, _FIGURES = (f"studies/time_to_accuracy/{kind}" for kind in ("results", "figures"))
 
-RESULTS = tuple(
-    f"python -m studies.time_to_accuracy --recipes {recipes} --seeds {seeds} --json "
-    f"{_RESULTS}/{name}.json --figure {_FIGURES}/{name}.svg"
-    for name, recipes, seeds in (
-        ("distillation", "fast precise", "0 1 2 3 4"),
-        ("reinforcement_learning", "paper sb3-ppo sb3-sac", "1"),
-    )
+RESULTS = (
+    *(
+        f"python -m studies.time_to_accuracy --recipes {recipes} --seeds {seeds} --json "
+        f"{_RESULTS}/{name}.json --figure {_FIGURES}/{name}.svg"
+        for name, recipes, seeds in (
+            ("distillation", "fast precise", "0 1 2 3 4"),
+            ("reinforcement_learning", "paper sb3-ppo sb3-sac", "1"),
+        )
+    ),
+    f"python -m studies.time_to_accuracy --recipes universal --seeds 0 1 2 --json "
+    f"{_RESULTS}/universal.json",
 )
 
 TABLES = tuple(
     table
-    for name in ("distillation", "reinforcement_learning")
+    for name in ("distillation", "reinforcement_learning", "universal")
     for table in (
         (
             "table",

@@ -6,6 +6,7 @@ disturbance.
 """
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -30,7 +31,7 @@ from hopping_leg.identify.search import SearchOptions
 from hopping_leg.locks import hold_folder
 from hopping_leg.robot import NO_MISMATCH, Latency, Robot, load_robot, parent_robot, shipped_robots
 from hopping_leg.sim import NO_NOISE, Measurement, NoiseAndDelay
-from hopping_leg.sim.randomization import draw_twin
+from hopping_leg.sim.randomization import RANDOMIZABLE, Range, draw_twin
 from hopping_leg.sim_to_real.jobs import Job, StoredJob, work_through
 from hopping_leg.sim_to_real.tables import tabulate
 
@@ -244,12 +245,22 @@ class IdentifyTwin(StoredJob):
 
 @dataclass(frozen=True)
 class TrainPolicy(Job):
-    """Training of a policy in the simulation of the robot ``source``; it has a folder."""
+    """Training of a policy in the simulation of the robot ``source``; it has a folder.
+
+    Attributes:
+        folder: Of the training.
+        source: Name or file of the robot.
+        recipe: By which it is trained.
+        seed: Of the training.
+        intervals: Whether every leg draws each fitted number from its interval; they stand in the
+            .json beside the robot's file.
+    """
 
     folder: Path
     source: str
     recipe: "Recipe"
     seed: int = 0
+    intervals: bool = False
 
     @property
     def weight(self) -> float:
@@ -279,7 +290,7 @@ class TrainPolicy(Job):
         from hopping_leg.rl.train import train
 
         robot = simulated(self.source)
-        train(self.recipe, robot, self.seed, self.folder, resume=True, threads=1, quiet=quiet)
+        train(self.trained, robot, self.seed, self.folder, resume=True, threads=1, quiet=quiet)
 
     def progress(self) -> tuple[float, str]:
         """Return the share done and what to show while it runs."""
@@ -311,7 +322,30 @@ class TrainPolicy(Job):
         from hopping_leg.rl.run_folder import RunFolder
 
         robot = simulated(self.source)
-        return RunFolder(self.folder, self.recipe.fit(robot), robot, self.seed, None)
+        return RunFolder(self.folder, self.trained.fit(robot), robot, self.seed, None)
+
+    @property
+    def trained(self) -> "Recipe":
+        """The recipe with the ranges of the fit's numbers, once there is a fit."""
+        if not self.intervals:
+            return self.recipe
+        content = json.loads(Path(self.source).with_suffix(".json").read_text(encoding="utf-8"))
+        return self.recipe.replace({"task.randomised": interval_ranges(content["parameters"])})
+
+
+def interval_ranges(parameters: Sequence[dict[str, Any]]) -> tuple[Range, ...]:
+    """Return the intervals of a fit as ranges, of the numbers that may differ from leg to leg.
+
+    What the data say nothing about spans what the fit searched. Correlations are left out.
+    """
+    found = []
+    for row in parameters:
+        low, high = row["interval_low"], row["interval_high"]
+        if low is None or high is None:  # not finite
+            low, high = row["bound_low"], row["bound_high"]
+        if row["name"] in RANDOMIZABLE:
+            found.append(Range(row["name"], row["unit"], low, high, "95 % interval of the fit"))
+    return tuple(found)
 
 
 _KEPT = ("command_m", "median_error_m", "median_abs_error_m", "std_m", "hops", "skipped_hops",
