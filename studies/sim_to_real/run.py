@@ -28,8 +28,10 @@ from hopping_leg.robot import (
     load_robot,
 )
 from hopping_leg.sim_to_real.jobs import work_through
+from hopping_leg.sim_to_real.policies import HopTrial
 from hopping_leg.sim_to_real.tables import Row, median_over_twins, overall, tabulate
-from hopping_leg.sim_to_real.transfer import HopTrial, Twin, about, simulated
+from hopping_leg.sim_to_real.transfer import about
+from hopping_leg.sim_to_real.twins import Twin, simulated
 from studies.sim_to_real.study import DEFAULT, FORETOLD, Method, Study, choose_methods, find_twins
 from studies.sim_to_real.zero_shot import ZeroShot
 

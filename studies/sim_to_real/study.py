@@ -18,14 +18,12 @@ from hopping_leg.identify.recording_format import Rig
 from hopping_leg.rl.recipes import Randomise, change, get_recipe, randomise
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim_to_real.jobs import StoredJob
-from hopping_leg.sim_to_real.transfer import (
-    COMMANDS,
+from hopping_leg.sim_to_real.policies import COMMANDS, HopTrial, TrainPolicy
+from hopping_leg.sim_to_real.twins import (
     RIGS,
     SHORTEST,
-    HopTrial,
     IdentifyTwin,
     RecordTwin,
-    TrainPolicy,
     Twin,
     drawn_twin,
     given_twin,

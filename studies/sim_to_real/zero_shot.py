@@ -26,7 +26,7 @@ from hopping_leg.evaluate.tables import millimetres
 from hopping_leg.hop_detection import find_hops, measure_hops
 from hopping_leg.robot import JOINTS, Robot, load_robot, parent_robot
 from hopping_leg.sim_to_real.jobs import StoredJob, work_through
-from hopping_leg.sim_to_real.transfer import disturbance_of, drawn_twin
+from hopping_leg.sim_to_real.twins import disturbance_of, drawn_twin
 from hopping_leg.terminal import plain_console
 
 COMMANDS = (0.22, 0.24, 0.26, 0.28, 0.30, 0.32, 0.34, 0.36, 0.38, 0.40)

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from hopping_leg.sim_to_real import transfer
-from hopping_leg.sim_to_real.transfer import simulated
+from hopping_leg.sim_to_real import policies
+from hopping_leg.sim_to_real.twins import simulated
 
 pytest.importorskip("torch")
 from studies.sim_to_real.run import foretold, met, prediction_rows
@@ -36,7 +36,7 @@ def test_errors_are_predicted_minus_measured_apexes_of_the_same_twin(tmp_path):
 def test_the_controllers_hop_in_the_methods_simulation(tmp_path, monkeypatch):
     one = study(tmp_path, ("truth",))
     legs = []
-    monkeypatch.setattr(transfer, "hop", lambda _, leg, *trials: legs.append(leg) or [])
+    monkeypatch.setattr(policies, "hop", lambda _, leg, *trials: legs.append(leg) or [])
     jobs = [*foretold(one), *met(one)]
     for job in jobs:
         assert not job.done

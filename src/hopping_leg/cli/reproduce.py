@@ -22,7 +22,8 @@ from hopping_leg import errors, io
 from hopping_leg.cli import evaluate, options
 from hopping_leg.controllers.registry import ENERGY_SHAPING, shipped_policies
 from hopping_leg.identify.optimizers import LeastSquaresOptions
-from hopping_leg.sim_to_real.transfer import USUAL_FIT, Transfer, drawn_twin, given_twin
+from hopping_leg.sim_to_real.transfer import Transfer
+from hopping_leg.sim_to_real.twins import USUAL_FIT, drawn_twin, given_twin
 
 _GLANCE = LeastSquaresOptions(rounds=1, evaluations=2)
 _MARK = "size.txt"
