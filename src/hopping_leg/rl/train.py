@@ -23,14 +23,12 @@ from hopping_leg.rl import (
     training_legs,
 )
 from hopping_leg.rl.checkpoint import write_checkpoint
-from hopping_leg.rl.distillation.dagger import DaggerConfig
 from hopping_leg.rl.learner import RecentHops
 from hopping_leg.rl.model_card import write_card
 from hopping_leg.rl.policy_evaluation import calibrate
 from hopping_leg.rl.recipe import Recipe
+from hopping_leg.rl.selection import Selection
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim import compile_physics
-from hopping_leg.workers import ProcessWorkers, RayWorkers
 
 
 class TrainingProgress(LiveProgress):
@@ -139,7 +137,9 @@ def train(
         recipe, worst_score = stages.within_reach(fitted, robot)
         with locks.hold_folder(out, errors.UsageError):
             tree = folder.begin(resume=resume)
-            legs = _find_legs(fitted, seed, folder, max(threads, 2), ray, progress)
+            legs = training_legs.find_legs(
+                fitted, seed, folder.path / "legs.json", max(threads, 2), ray, progress.prepare
+            )
             trainer = Trainer(recipe, robot, seed, folder, minutes, threads, began, legs)
             trainer.end_stage(worst_score)
             trainer.learner.set_logger(loggers.make_logger(folder.path, log, folder.config))
@@ -147,30 +147,6 @@ def train(
             if tree is not None:
                 trainer.restore(tree)
             return trainer.run(progress)
-
-
-def _find_legs(
-    recipe: Recipe,
-    seed: int,
-    folder: run_folder.RunFolder,
-    processes: int,
-    ray: str | None,
-    progress: TrainingProgress,
-) -> list[TaskLeg]:
-    """Return the legs of a training for any leg, none for others."""
-    if recipe.legs == "robot":
-        return []
-    assert isinstance(recipe.algorithm, DaggerConfig), "a teacher says what legs reach"
-    teacher = (recipe.algorithm.teacher, recipe.algorithm.planning)
-    count, file = recipe.schedule.num_envs, folder.path / "legs.json"
-    compile_physics()
-    with ProcessWorkers(processes) as local:
-        workers = local if ray is None else RayWorkers(ray)
-        found = training_legs.reach_of_legs(
-            count, seed, recipe.task.command_bounds, teacher, workers, file,
-            lambda known: progress.prepare("trying legs", known / count),
-        )  # fmt: skip
-    return [training_legs.task_leg(reach) for reach in found]
 
 
 class Trainer:
@@ -351,75 +327,3 @@ class Trainer:
         self._progress.update(
             min(share, 1.0), steps, self.learner.recent_hops, self.selection.describe()
         )
-
-
-FINALISTS = 4
-"""Snapshots that are tried once more at the end."""
-
-
-class Selection:
-    """Tries every snapshot on one seed; the best few again on others, and one of those wins."""
-
-    def __init__(self, recipe: Recipe, robot: Robot, folder: run_folder.RunFolder) -> None:
-        self._recipe, self._robot, self._folder = recipe, robot, folder
-        self.rows: list[dict[str, Any]] = []
-        """Every snapshot so far: steps, minutes, score and trials, as JSON values."""
-
-    @property
-    def next_at(self) -> int:
-        """Steps after which the next snapshot is due."""
-        every = self._recipe.selection.eval_every
-        return every * (self.rows[-1]["steps"] // every + 1) if self.rows else every
-
-    def add(self, steps: int, minutes: float, content: bytes) -> dict[str, Any]:
-        """Keep and try a policy file; return its row."""
-        io.write_atomically(self._folder.snapshot(steps), content)
-        row = {
-            "steps": steps,
-            "minutes": minutes,
-            **self.trials(content),
-        }
-        self.rows.append(row)
-        return row
-
-    def choose(self) -> tuple[bytes, dict[str, Any]]:
-        """Return the best policy file and its row, with the scores of all finalists."""
-        if len(self.rows) == 1 and self._recipe.selection.calibrations:
-            content = self._folder.snapshot(self.rows[0]["steps"]).read_bytes()
-            return content, {**self.rows[0], "seeds": list(policy_evaluation.FINAL_SEEDS)}
-        ranked = sorted(self.rows, key=lambda row: float(row["score_m"]))[:FINALISTS]
-        finals = []
-        for row in ranked:
-            content = self._folder.snapshot(row["steps"]).read_bytes()
-            tried = {"steps": row["steps"], "minutes": row["minutes"], **self.final(content)}
-            finals.append((tried, content))
-        best, content = min(finals, key=lambda final: float(final[0]["score_m"]))
-        scores = [{"steps": row["steps"], "score_m": row["score_m"]} for row, _ in finals]
-        return content, {**best, "finalists": scores, "seeds": list(policy_evaluation.FINAL_SEEDS)}
-
-    def final(self, content: bytes) -> dict[str, Any]:
-        """Try a policy file on the seeds that judge the best."""
-        return self.trials(content, policy_evaluation.FINAL_SEEDS)
-
-    def describe(self) -> str:
-        """Return what to show of the best snapshot so far, or nothing."""
-        if not self.rows:
-            return ""
-        best = min(self.rows, key=lambda row: float(row["score_m"]))
-        return f" · best snapshot {1000 * best['score_m']:.0f} mm"
-
-    def trials(
-        self, content: bytes, seeds: tuple[int, ...] = (policy_evaluation.FIRST_SEED,)
-    ) -> dict[str, Any]:
-        """Return score, m, and trials of a policy file, as JSON values."""
-        recipe = self._recipe
-        policy = Policy(content, "snapshot", recipe.name)
-        policy.set_robot(self._robot)
-        results = policy_evaluation.evaluate_policy(
-            policy, self._robot, recipe.selection.eval_commands, seeds, recipe.task.rate
-        )
-        return {
-            "score_m": policy_evaluation.score(results),
-            "worst_score_m": max(map(policy_evaluation.command_score, results)),
-            "trials": policy_evaluation.as_rows(results),
-        }

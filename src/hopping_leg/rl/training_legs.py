@@ -15,10 +15,12 @@ import numpy as np
 from hopping_leg import io
 from hopping_leg.controllers.mpc import HopShape, Planning, TrueStateMpc
 from hopping_leg.envs.task import TaskLeg
+from hopping_leg.rl.distillation.dagger import DaggerConfig
 from hopping_leg.rl.policy_evaluation import CommandResult, evaluate_policy
-from hopping_leg.sim import NO_NOISE
+from hopping_leg.rl.recipe import Recipe
+from hopping_leg.sim import NO_NOISE, compile_physics
 from hopping_leg.sim.any_leg import draw_any_leg
-from hopping_leg.workers import Workers
+from hopping_leg.workers import ProcessWorkers, RayWorkers, Workers
 
 _HEIGHTS, _LEAST = 9, 2  # tried, and reached at least
 _SECONDS, _STEP = 3.5, 5e-4
@@ -112,6 +114,42 @@ def reach_of_legs(
         io.write_json(file, {"asked": asked, "tried": tried, "legs": rows})
         on_progress(min(len(found), count))
     return found[:count]
+
+
+def find_legs(
+    recipe: Recipe,
+    seed: int,
+    file: Path,
+    processes: int,
+    ray: str | None,
+    on_progress: Callable[[str, float], None],
+) -> list[TaskLeg]:
+    """Return the legs of a training for any leg, none for others.
+
+    Args:
+        recipe: Of the training.
+        seed: Of the training.
+        file: Keeps what is found.
+        processes: Of this machine, which find out what the teacher reaches.
+        ray: Address of a Ray cluster that does it instead.
+        on_progress: Told what is done, and the share of it, 0 to 1.
+
+    Raises:
+        UsageError: The file is damaged.
+    """
+    if recipe.legs == "robot":
+        return []
+    assert isinstance(recipe.algorithm, DaggerConfig), "a teacher says what legs reach"
+    teacher = (recipe.algorithm.teacher, recipe.algorithm.planning)
+    count = recipe.schedule.num_envs
+    compile_physics()
+    with ProcessWorkers(processes) as local:
+        workers = local if ray is None else RayWorkers(ray)
+        found = reach_of_legs(
+            count, seed, recipe.task.command_bounds, teacher, workers, file,
+            lambda known: on_progress("trying legs", known / count),
+        )  # fmt: skip
+    return [task_leg(reach) for reach in found]
 
 
 def task_leg(reach: Reach) -> TaskLeg:
