@@ -63,7 +63,7 @@ VERBS = {
             ("found.toml", "found.json"),
             (
                 f"{_HOP} excite multisine --robot legv2 --centre 0.7 -1.4 --amplitude 0.3 0.4"
-                " --out {inputs}/multisine.parquet",
+                " --duration 20 --out {inputs}/multisine.parquet",
                 f"{_HOP} record {{inputs}}/multisine.parquet --robot twin --believed legv2"
                 " --out {inputs}",
             ),
