@@ -130,6 +130,7 @@ class TimeToAccuracy:
 def judge(content: bytes, robot: Robot) -> Row:
     """Return the accuracy of a policy file every 2 cm of its range, or at the paper's heights."""
     policy = Policy(content, "policy", "policy")
+    policy.set_robot(robot)
     low, high = max(policy.card.command_low, 0.22), policy.card.command_high
     heights = tuple(np.arange(low, high + 1e-6, _SPACING).round(3).tolist())
     if (low, high) == (0.25, 0.35):
