@@ -37,9 +37,11 @@ RESULTS = (
     "python -m studies.sim_to_real transfer --methods universal-identified universal "
     "energy-shaping energy-shaping-tuned --jobs 2 "
     "--folder runs/transfer-universal --json studies/sim_to_real/results/universal.json",
-    "python -m studies.sim_to_real transfer --methods identified identified-posterior cad table-1 "
-    "randomised energy-shaping --jobs 2 --folder runs/transfer-fast --json "
+    "python -m studies.sim_to_real transfer --jobs 2 --folder runs/transfer-fast --json "
     "studies/sim_to_real/results/fast.json",
+    "python -m studies.sim_to_real transfer --methods identified identified-posterior "
+    "energy-shaping --twins 10 --jobs 2 --folder runs/transfer-fast --json "
+    "studies/sim_to_real/results/posterior.json",
     "python -m studies.sim_to_real prediction --twins 5 --jobs 2 --json "
     "studies/sim_to_real/results/prediction.json",
 )
@@ -67,7 +69,7 @@ TABLES = (
     ("table", "zero_shot_legs.json", "summary", *ZERO_SHOT),
     *(
         part
-        for file in ("universal.json", "fast.json")
+        for file in ("universal.json", "fast.json", "posterior.json")
         for part in (
             (
                 "table",
