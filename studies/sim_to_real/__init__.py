@@ -24,7 +24,8 @@ RESULTS = (
     "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping mpc --twins 20 "
     "--seed 6000 --commands 0.22,0.28,0.34,0.40 --jobs 2 --out runs/zero-shot-mpc "
     "--json studies/sim_to_real/results/zero_shot_mpc.json",
-    "python -m studies.time_to_accuracy --recipes universal --seeds 0 1 2 && "
+    "python -m studies.time_to_accuracy --recipes universal --seeds 0 1 2 "
+    "--out runs/time_to_accuracy && "
     "python -m studies.sim_to_real zero-shot --controllers universal "
     "runs/time_to_accuracy/universal-1/1/policy.onnx "
     "runs/time_to_accuracy/universal-2/1/policy.onnx energy-shaping --twins 20 --seed 7000 "
