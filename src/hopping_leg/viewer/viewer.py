@@ -1,7 +1,6 @@
 """The page and the loop behind it: what is asked, what passes, what is shown."""
 
 import contextlib
-import functools
 import html
 import io
 import math
@@ -22,6 +21,8 @@ FRAME_RATE = 60.0
 _SLOW = 6
 """Pictures per update of each plot and of the text; they take turns."""
 _NOTICE_SECONDS = 8.0
+_SLOW_BROWSER = "webgl-software-rendering"
+"""viser's name of its notice of a slow browser."""
 _RESOLUTION = (resources.files("hopping_leg.viewer") / "resolution.js").read_text(encoding="utf-8")
 _APEX_SECONDS = 3.0
 
@@ -78,7 +79,8 @@ class Viewer:
         panel.dock_right()
         panel.set_width(390)
         self._scene = scene.Scene(self._server)
-        self._server.on_client_connect(functools.partial(_prepare, adapt=detail is None))
+        if detail is None:
+            self._server.on_client_connect(_adapt_resolution)
         self.frames = 0
         self._stopped = False
 
@@ -103,6 +105,7 @@ class Viewer:
         if turn == _SLOW - 1:
             self._scene.mark(source.now)
             self._status.content = self._text()
+            self._uncover_legs()
             if self._replay_panel is not None:
                 self._replay_panel.show()
             self._notify(source.notices)
@@ -122,6 +125,12 @@ class Viewer:
         for sentence in sentences:
             for client in self._server.get_clients().values():
                 client.add_notification("Hopping leg", sentence, auto_close_seconds=_NOTICE_SECONDS)
+
+    def _uncover_legs(self) -> None:
+        """Take away viser's notice of a slow browser, which pages may show at any time."""
+        for client in self._server.get_clients().values():
+            connection = client._websock_connection  # there is no public way to a page
+            connection.queue_message(_messages.RemoveNotificationMessage(_SLOW_BROWSER))
 
     def _text(self) -> str:
         """Return what the page says: one line per leg, and the time."""
@@ -143,12 +152,10 @@ class Viewer:
         return f'<div style="padding:0.4em 1em;line-height:1.5">{"<br>".join(lines)}</div>'
 
 
-def _prepare(client: viser.ClientHandle, *, adapt: bool) -> None:
-    """Take viser's notice of a slow browser away from the legs, and let resolution adapt to it."""
+def _adapt_resolution(client: viser.ClientHandle) -> None:
+    """Let a page draw as many pixels as its browser keeps up with."""
     connection = client._websock_connection  # there is no public way to a page
-    connection.queue_message(_messages.RemoveNotificationMessage("webgl-software-rendering"))
-    if adapt:
-        connection.queue_message(_messages.RunJavascriptMessage(_RESOLUTION))
+    connection.queue_message(_messages.RunJavascriptMessage(_RESOLUTION))
 
 
 def _serve(host: str, port: int) -> tuple[viser.ViserServer, str]:
