@@ -1,5 +1,6 @@
 """What a study was asked for, its jobs, and where policies are trained before they meet a twin."""
 
+import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -15,8 +16,10 @@ from hopping_leg.identify import cost, optimizers, plan
 from hopping_leg.identify.pipeline import IdentifyOptions
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import Rig
+from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes import Randomise, change, get_recipe, randomise
 from hopping_leg.robot import Robot, load_robot
+from hopping_leg.sim.randomization import RANDOMIZABLE, Range
 from hopping_leg.sim_to_real.jobs import StoredJob
 from hopping_leg.sim_to_real.policies import COMMANDS, HopTrial, TrainPolicy
 from hopping_leg.sim_to_real.twins import (
@@ -199,6 +202,32 @@ class SearchTwin(IdentifyTwin):
         )
 
 
+@dataclass(frozen=True)
+class TrainOnIntervals(TrainPolicy):
+    """Training on an identified robot, whose legs draw each fitted number from its interval."""
+
+    @property
+    def trained(self) -> Recipe:
+        """The recipe with the intervals of the fit, which stands beside the robot's file."""
+        content = json.loads(Path(self.source).with_suffix(".json").read_text(encoding="utf-8"))
+        return self.recipe.replace({"task.randomised": interval_ranges(content["parameters"])})
+
+
+def interval_ranges(parameters: Sequence[dict[str, Any]]) -> tuple[Range, ...]:
+    """Return the intervals of a fit as ranges, of the numbers that may differ from leg to leg.
+
+    What the data say nothing about spans what the fit searched. Correlations are left out.
+    """
+    found = []
+    for row in parameters:
+        low, high = row["interval_low"], row["interval_high"]
+        if low is None or high is None:  # not finite
+            low, high = row["bound_low"], row["bound_high"]
+        if row["name"] in RANDOMIZABLE:
+            found.append(Range(row["name"], row["unit"], low, high, "95 % interval of the fit"))
+    return tuple(found)
+
+
 _SEARCH = GainSearch(threads=1)
 
 
@@ -288,7 +317,7 @@ class Study:
         folder = self.folder / "training" / f"{name}-seed{seed}"
         recipe = change(get_recipe(self.recipe), [*self.changes, f"steps={self.steps}"])
         if method.ranges == "intervals":
-            return TrainPolicy(folder, self.source(twin, method), recipe, seed, intervals=True)
+            return TrainOnIntervals(folder, self.source(twin, method), recipe, seed)
         recipe = randomise(recipe, method.ranges)
         return TrainPolicy(folder, self.source(twin, method), recipe, seed)
 

@@ -1,7 +1,6 @@
 """Policies trained on what is known of a twin, and their hops on it."""
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -15,7 +14,6 @@ from hopping_leg.evaluate import entries, runner
 from hopping_leg.evaluate.motor_load import MotorLoad
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim import Measurement
-from hopping_leg.sim.randomization import RANDOMIZABLE, Range
 from hopping_leg.sim_to_real.jobs import Job, StoredJob
 from hopping_leg.sim_to_real.twins import Twin, disturbance_of, simulated
 
@@ -32,22 +30,17 @@ FIRST_SEED = 1000
 
 @dataclass(frozen=True)
 class TrainPolicy(Job):
-    """Training of a policy in the simulation of the robot ``source``; it has a folder.
-
-    Attributes:
-        folder: Of the training.
-        source: Name or file of the robot.
-        recipe: By which it is trained.
-        seed: Of the training.
-        intervals: Whether every leg draws each fitted number from its interval; they stand in the
-            .json beside the robot's file.
-    """
+    """Training of a policy in the simulation of the robot ``source``; it has a folder."""
 
     folder: Path
     source: str
     recipe: "Recipe"
     seed: int = 0
-    intervals: bool = False
+
+    @property
+    def trained(self) -> "Recipe":
+        """What is trained; it may depend on earlier jobs."""
+        return self.recipe
 
     @property
     def weight(self) -> float:
@@ -110,29 +103,6 @@ class TrainPolicy(Job):
 
         robot = simulated(self.source)
         return RunFolder(self.folder, self.trained.fit(robot), robot, self.seed, None)
-
-    @property
-    def trained(self) -> "Recipe":
-        """The recipe with the ranges of the fit's numbers, once there is a fit."""
-        if not self.intervals:
-            return self.recipe
-        content = json.loads(Path(self.source).with_suffix(".json").read_text(encoding="utf-8"))
-        return self.recipe.replace({"task.randomised": interval_ranges(content["parameters"])})
-
-
-def interval_ranges(parameters: Sequence[dict[str, Any]]) -> tuple[Range, ...]:
-    """Return the intervals of a fit as ranges, of the numbers that may differ from leg to leg.
-
-    What the data say nothing about spans what the fit searched. Correlations are left out.
-    """
-    found = []
-    for row in parameters:
-        low, high = row["interval_low"], row["interval_high"]
-        if low is None or high is None:  # not finite
-            low, high = row["bound_low"], row["bound_high"]
-        if row["name"] in RANDOMIZABLE:
-            found.append(Range(row["name"], row["unit"], low, high, "95 % interval of the fit"))
-    return tuple(found)
 
 
 _KEPT = ("command_m", "median_error_m", "median_abs_error_m", "std_m", "hops", "skipped_hops",

@@ -7,7 +7,7 @@ would come on top. A twin without [reality] is met with the paper's disturbance.
 import json
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from hopping_leg import io, trace
 from hopping_leg.errors import UsageError
@@ -24,9 +24,6 @@ from hopping_leg.robot import NO_MISMATCH, Latency, Robot, load_robot, parent_ro
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 from hopping_leg.sim.randomization import draw_twin
 from hopping_leg.sim_to_real.jobs import StoredJob
-
-if TYPE_CHECKING:
-    pass
 
 RIGS: tuple[Rig, ...] = ("fixed-base", "rail")
 

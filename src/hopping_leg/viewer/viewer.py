@@ -129,8 +129,7 @@ class Viewer:
     def _uncover_legs(self) -> None:
         """Take away viser's notice of a slow browser, which pages may show at any time."""
         for client in self._server.get_clients().values():
-            connection = client._websock_connection  # there is no public way to a page
-            connection.queue_message(_messages.RemoveNotificationMessage(_SLOW_BROWSER))
+            _send(client, _messages.RemoveNotificationMessage(_SLOW_BROWSER))
 
     def _text(self) -> str:
         """Return what the page says: one line per leg, and the time."""
@@ -154,8 +153,12 @@ class Viewer:
 
 def _adapt_resolution(client: viser.ClientHandle) -> None:
     """Let a page draw as many pixels as its browser keeps up with."""
-    connection = client._websock_connection  # there is no public way to a page
-    connection.queue_message(_messages.RunJavascriptMessage(_RESOLUTION))
+    _send(client, _messages.RunJavascriptMessage(_RESOLUTION))
+
+
+def _send(client: viser.ClientHandle, message: _messages.Message) -> None:
+    """Send a page what viser has no public call for."""
+    client._websock_connection.queue_message(message)
 
 
 def _serve(host: str, port: int) -> tuple[viser.ViserServer, str]:
