@@ -117,7 +117,7 @@ def hop(name: str, robot_name: str, command: float, minutes: float, seed: int) -
             lockstep.link.close()
     trace = done.trace
     time, height, clearance = np.array(lockstep.truth).T
-    begin = time[0] + SequenceTiming().rise + SequenceTiming().settle + _SETTLE
+    begin = time[0] + sequence.timing.before_hop + _SETTLE
     inside = (time > begin) & (time < begin - _SETTLE + 60 * minutes)
     height, clearance = height[inside], clearance[inside]
     hops = measure_hops(height, np.gradient(height, 1 / CONTROL_RATE), clearance, CONTROL_RATE)

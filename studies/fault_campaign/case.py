@@ -10,7 +10,7 @@ import numpy as np
 from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.fallback import with_fallback
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.deploy.drive_info import inspect
+from hopping_leg.deploy.drive_info import home, inspect
 from hopping_leg.deploy.hardware_trials import Performance, header_of, perform
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
@@ -28,7 +28,7 @@ from studies.fault_campaign.verdict import Limits
 HEIGHTS = (0.25, 0.30, 0.35)
 """Commanded heights, m; each trial takes one."""
 
-_TIMING = SequenceTiming(hop=0.0, rise=0.3, settle=0.1)
+_TIMING = SequenceTiming(hop=0.0, rise=0.3, squat=0.0, settle=0.1)
 _FIRST_HOP = 0.6
 """Time that the first lift-off may take, s."""
 _AFTERWARDS = 0.3
@@ -115,11 +115,13 @@ class Scene:
         """Time of the computer between the moment of the hop and a kill, s."""
 
     def require_fitness(self, link: MoteusLink) -> None:
-        """Check the drives as before arming.
+        """Check the drives as before arming, homed if the mishap says so.
 
         Raises:
             HardwareError: They may not be armed.
         """
+        if self.mishap.homed:
+            home(link, hopping_poses(self.robot).start.tolist())
         require_fit(check_drives(self.robot, self.safety_limits, inspect(link)))
 
     def perform(
@@ -147,7 +149,7 @@ class Scene:
                 SequenceTiming() if self.family.grounded else _TIMING,
                 hop=_FIRST_HOP + self.mishap.at + _AFTERWARDS,
             ),
-            weighed=self.robot,
+            checked=self.robot,
         )
         self.require_fitness(link)
         done = perform(
@@ -170,7 +172,8 @@ def words(mishap: Mishap) -> str:
     """Return a mishap in words."""
     if mishap.start is not None:
         faults = ", ".join(map(_of_fault, mishap.start.faults))
-        return faults or f"pose {mishap.start.pose}"
+        homed = ", homed in its start pose" if mishap.homed else ""
+        return f"{faults}{homed}" or f"pose {mishap.start.pose}"
     if mishap.fault is not None:
         both = map(_of_fault, filter(None, (mishap.fault, mishap.second)))
         return f"{' and '.join(both)} at {mishap.fault.at:.3f} s"

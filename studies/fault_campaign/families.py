@@ -24,6 +24,7 @@ class Mishap:
         stall: How long the host stands still, s; 0 if it does not.
         dies: Whether the host is killed.
         start: Differences of the start, where the leg must not be armed at all.
+        homed: Whether the drives are told that the leg stands in its start pose.
         at: When, s after the first lift-off.
     """
 
@@ -32,6 +33,7 @@ class Mishap:
     stall: float = 0.0
     dies: bool = False
     start: EmulatorConfig | None = None
+    homed: bool = False
     at: float = 0.0
 
 
@@ -130,14 +132,20 @@ def _pose(rng: np.random.Generator) -> Mishap:
 
 
 def _wiring(rng: np.random.Generator) -> Mishap:
-    """A wrong sign of the hip, or a wrong gear or belt of the knee, in a pose that looks right."""
-    hip, knee = rng.uniform(0.5, 1.1), rng.uniform(-2.1, -1.0)
-    if rng.random() < 0.5:
-        fault, hip = Fault("reversed", drive="hip"), -hip
+    """A wrong sign of a joint, or a wrong gear or belt of the knee, in a pose that looks right.
+
+    The drives were homed while the leg hung straight, or where it stands now.
+    """
+    hip, knee, homed = rng.uniform(0.5, 1.1), rng.uniform(-2.1, -1.0), bool(rng.random() < 0.5)
+    kind = int(rng.integers(3 if homed else 2))
+    if kind:
+        fault = Fault("reversed", drive=("hip", "knee")[kind - 1])
+        hip = hip if homed else -hip
     else:
         ratio = float(rng.choice([0.5, 2 / 3, 1.5, 2.0]))
-        fault, knee = Fault("ratio", drive="knee", value=ratio), knee / ratio
-    return Mishap(start=EmulatorConfig(faults=(fault,), pose=f"{hip:.3f},{knee:.3f}"))
+        fault, knee = Fault("ratio", drive="knee", value=ratio), knee if homed else knee / ratio
+    start = EmulatorConfig(faults=(fault,), pose=f"{hip:.3f},{knee:.3f}")
+    return Mishap(start=start, homed=homed)
 
 
 _SETTINGS = {
@@ -265,7 +273,7 @@ FAMILIES: dict[str, Family] = dict(
             Family(
                 "wrong wiring",
                 _wiring,
-                frozenset({_R.WEIGHT_WRONG, _R.POSITION_LIMIT, _R.SPEED_LIMIT}),
+                frozenset({_R.STANDS_WRONG, _R.POSITION_LIMIT, _R.SPEED_LIMIT}),
                 grounded=True,
             ),
         ),

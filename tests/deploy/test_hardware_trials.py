@@ -48,7 +48,7 @@ def emulated():
         yield start
 
 
-def run(lockstep, path, *, controller="energy-shaping", hop=0.5, rise=0.5, weighed=None):
+def run(lockstep, path, *, controller="energy-shaping", hop=0.5, rise=0.5, checked=None):
     controller = load_controller(controller, LEG)
     sequence = MotionSequence(
         controller,
@@ -56,20 +56,24 @@ def run(lockstep, path, *, controller="energy-shaping", hop=0.5, rise=0.5, weigh
         hopping_poses(LEG),
         SoftLimiter(LEG, SoftLimits()),
         SequenceTiming(hop=hop, rise=rise, settle=0.2, sink=0.6),
-        weighed=weighed,
+        checked=checked,
     )
     header = header_of(LEG, controller, 200.0)
     return perform(lockstep.link, sequence, LIMITS, path, header, clock=lockstep, realtime=False)
 
 
-def test_a_hip_that_turns_the_other_way_never_hops(emulated, tmp_path):
+@pytest.mark.parametrize("homed", ["hanging", "standing"])
+def test_a_hip_that_turns_the_other_way_never_hops(emulated, tmp_path, homed):
     q = hopping_poses(LEG).start
-    wrong = emulated(faults=(Fault("reversed", drive="hip"),), pose=f"{-q[0]},{q[1]}")
+    hip = -q[0] if homed == "hanging" else q[0]
+    wrong = emulated(faults=(Fault("reversed", drive="hip"),), pose=f"{hip},{q[1]}")
+    if homed == "standing":
+        home(wrong.link, q.tolist())
     require_fit(check_drives(LEG, LIMITS, inspect(wrong.link)))
-    done = run(wrong, tmp_path / "wrong.parquet", rise=2.0, weighed=LEG)
-    assert done.outcome.supervisor.stop_cause.reason is Reason.WEIGHT_WRONG
+    done = run(wrong, tmp_path / "wrong.parquet", rise=2.0, checked=LEG)
+    assert done.outcome.supervisor.stop_cause.reason is Reason.STANDS_WRONG
     assert np.isnan(done.trace.column("hip_command_nm")).all()
-    right = run(emulated(), tmp_path / "right.parquet", rise=2.0, weighed=LEG)
+    right = run(emulated(), tmp_path / "right.parquet", rise=2.0, checked=LEG)
     assert right.outcome.supervisor.stop_cause.reason is Reason.FINISHED
 
 

@@ -123,7 +123,7 @@ def at(tick, index, **changes):
         (seen(2, late=0.05), Reason.LOOP_STALLED, "50.0 ms"),
         (seen(2, wanted=None), Reason.CONTROLLER_FAILED, ""),
         (seen(2, wanted=(math.inf, 0.0)), Reason.TORQUE_NOT_FINITE, "inf"),
-        (seen(2, trouble="by the file"), Reason.WEIGHT_WRONG, "by the file"),
+        (seen(2, trouble="by the file"), Reason.STANDS_WRONG, "by the file"),
         (seen(2, finished=True), Reason.FINISHED, ""),
     ],
 )

@@ -1,7 +1,7 @@
 """Run a controller on the real leg, or on `hop emulate`.
 
 The drives are checked first; the leg is armed only when all is well and you agree. It rises to the
-start pose, hops, sinks down and stops. Any key but those for the height stops it at once, as do
+start pose, squats, hops, sinks down and stops. Any key but those for the height stops it at once, as do
 Ctrl-C, SIGTERM and the end of the terminal; a second signal brakes and leaves. A stop stays until
 you call this again. Everything is recorded, also when the process is killed:
 `hop report figures` reads the trace, or the flight recording that a killed run leaves behind.
@@ -156,8 +156,8 @@ def _perform(
     limiter = SoftLimiter(robot, SoftLimits()) if args.soft_limits else None
     timing = SequenceTiming(hop=seconds)
     hops = fallback.with_fallback(controller, robot)
-    weighed = None if isinstance(controller, joint_pd.JointPD) else robot
-    sequence = MotionSequence(hops, height or schedule, poses, limiter, timing, weighed=weighed)
+    checked = None if isinstance(controller, joint_pd.JointPD) else robot
+    sequence = MotionSequence(hops, height or schedule, poses, limiter, timing, checked=checked)
     limits = safety_limits.hopping_limits(robot, rate)
 
     @contextlib.contextmanager

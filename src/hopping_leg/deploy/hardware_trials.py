@@ -291,7 +291,7 @@ class DeployedRobot:
             hopping_poses(self.robot),
             protocol.SoftLimiter(self.robot, SoftLimits()),
             SequenceTiming(hop=schedule.seconds),
-            weighed=self.robot,
+            checked=self.robot,
         )
         with self.connect() as link:
             found = self.check(link)

@@ -1,10 +1,10 @@
-"""What the leg does while it is armed: rise to the start pose, hop, sink down.
+"""What the leg does while it is armed: rise to the start pose, squat, hop, sink down.
 
 Rising and sinking are minimum-jerk paths under the joint PD; the rise begins where the leg is, and
 the gains fade out before its end. The paper's soft limits stay in force throughout.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 import numpy as np
@@ -12,8 +12,8 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import command_schedule, joint_pd, protocol
 from hopping_leg.controllers.rollout import RolloutConfig
-from hopping_leg.deploy import weight_check
 from hopping_leg.deploy.drive_link import Pair
+from hopping_leg.deploy.standing_check import Squat
 from hopping_leg.robot import Robot, kinematics
 
 _ROUNDING = 1e-6  # Rounding of tick times, s; far less than a tick
@@ -28,6 +28,7 @@ class Part(IntEnum):
     HOP = 3
     SINK = 4
     DONE = 5
+    SQUAT = 6
 
 
 @dataclass(frozen=True)
@@ -36,15 +37,22 @@ class SequenceTiming:
 
     hop: float = 10.0
     rise: float = 2.0
+    squat: float = 0.8
     settle: float = 0.5
     sink: float = 1.5
     fade: float = 0.3
     """Fading of the gains at the end of the sinking."""
 
+    @property
+    def before_hop(self) -> float:
+        """From the beginning to the hop."""
+        return self.rise + self.squat + self.settle
+
     def phase(self, elapsed: float) -> tuple[Part, float]:
         """Return the part at a time since the start, and how long it has lasted."""
         for phase, seconds in (
             (Part.RISE, self.rise),
+            (Part.SQUAT, self.squat),
             (Part.SETTLE, self.settle),
             (Part.HOP, self.hop),
             (Part.SINK, self.sink),
@@ -100,8 +108,8 @@ class MotionSequence:
         limiter: None goes without soft limits.
         timing: Length of each part.
         gains: Joint PD of rising and sinking.
-        weighed: Robot whose weight the leg must carry before it hops, see ``weight_check``; None
-            does not look, as for a leg whose foot is off the ground.
+        checked: Robot as which the leg must stand and squat before it hops, see
+            ``standing_check``; None does not look, as for a leg whose foot is off the ground.
     """
 
     controller: protocol.Controller
@@ -110,11 +118,15 @@ class MotionSequence:
     limiter: protocol.SoftLimiter | None
     timing: SequenceTiming = field(default_factory=SequenceTiming)
     gains: joint_pd.JointGains = field(default_factory=joint_pd.JointGains)
-    weighed: Robot | None = None
+    checked: Robot | None = None
 
     def __post_init__(self) -> None:
+        self._squat: Squat | None = None
+        if self.checked is None:
+            self.timing = replace(self.timing, squat=0.0)
+        elif self.timing.squat:
+            self._squat = Squat(self.checked, self.poses.start, self.gains, self.timing.squat)
         self._began: float | None = None
-        self._forces: list[tuple[float, float]] = []
         self._from, self._phase = np.zeros(2), Part.WAIT
         self.controller.reset(1)
 
@@ -138,9 +150,11 @@ class MotionSequence:
             phase = Part.DONE
         if phase is not self._phase and phase in (Part.SINK, Part.DONE):
             self._from = q.copy()
-        if phase is Part.HOP and self._phase is not Part.HOP:
-            if trouble := self._unfit():
+        if self._squat is not None and self._phase is Part.SQUAT and phase is not Part.SQUAT:
+            trouble = self._squat.findings().complaint(self._squat.robot)
+            if trouble:
                 return SequenceStep((0.0, 0.0), self.command(time), phase, trouble=trouble)
+        if phase is Part.HOP and self._phase is not Part.HOP:
             self.controller.reset(1)
         self._phase = phase
         command = self.command(time)
@@ -148,8 +162,6 @@ class MotionSequence:
             asked = self.controller.act(measurement)[0]
         else:
             asked = self._hold(phase, lasted, q, qd)
-        if phase is Part.SETTLE and self.weighed is not None:
-            self._forces.append(weight_check.foot_force(self.weighed, q, asked))
         torque = asked
         if self.limiter is not None:
             samples = np.concatenate([measurement.q, measurement.qd], axis=2)
@@ -157,23 +169,17 @@ class MotionSequence:
         own = _pair(asked) if phase is Part.HOP else (np.nan, np.nan)
         return SequenceStep(_pair(torque), command, phase, own)
 
-    def _unfit(self) -> str:
-        """Return why the leg must not hop after it has settled, or ""."""
-        if self.weighed is None:
-            return ""
-        forward, upward = np.mean(self._forces[len(self._forces) // 2 :], axis=0)
-        return weight_check.complaint(self.weighed, forward, upward)
-
     def command(self, time: float) -> float:
         """Return the height commanded at a time, m."""
         if self._began is None:
             return self.commands.at(0.0)
-        hopped = time - self._began - self.timing.rise - self.timing.settle
-        return self.commands.at(max(hopped, 0.0))
+        return self.commands.at(max(time - self._began - self.timing.before_hop, 0.0))
 
     def _hold(self, phase: Part, lasted: float, q: Array, qd: Array) -> Array:
-        """Return the torque of rising, standing or sinking."""
+        """Return the torque of rising, squatting, standing or sinking."""
         timing, gains = self.timing, self.gains
+        if phase is Part.SQUAT and self._squat is not None:
+            return self._squat.torque(lasted, q, qd)
         if phase is Part.DONE:
             return np.zeros(2)
         strength = 1.0

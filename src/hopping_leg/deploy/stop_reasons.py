@@ -46,7 +46,7 @@ class Reason(IntEnum):
     CONTROLLER_FAILED = 26, "The controller raised an error."
     TORQUE_NOT_FINITE = 27, "The controller asked for a torque that is no number."
     ENCODER_DRIFT = 30, "A position moves away from what its velocity adds up to."
-    WEIGHT_WRONG = 29, "The leg does not stand as its robot's file says."
+    STANDS_WRONG = 29, "The leg does not stand as its robot's file says."
     CONTROLLER_SLOW = 28, "The controller takes longer than a control period has."
 
 
@@ -253,7 +253,7 @@ def _of_loop(limits: SafetyLimits, now: Counts, seen: SupervisorInput) -> Cause 
         reason = Reason.LOOP_STALLED if stalled else Reason.LOOP_OVERRUN
         return Cause(reason, _late_text(seen.late))
     if seen.trouble:
-        return Cause(Reason.WEIGHT_WRONG, seen.trouble)
+        return Cause(Reason.STANDS_WRONG, seen.trouble)
     if seen.wanted is None:
         return Cause(Reason.CONTROLLER_FAILED)
     if not math.isfinite(seen.wanted[0] + seen.wanted[1]):
