@@ -15,7 +15,7 @@ DRAWN = [draw_any_leg(seed) for seed in range(120)]
 
 
 def test_a_drawn_leg_is_a_robot_file_without_doubts(tmp_path):
-    for seed in range(12):
+    for seed in (*range(12), 124):  # the last's motors are too strong for its drives as first drawn
         drawn = draw_leg(seed)
         file = tmp_path / f"{drawn.robot.name}.toml"
         drawn.save(file)

@@ -1,9 +1,9 @@
 """Run a controller on the real leg, or on `hop emulate`.
 
 The drives are checked first; the leg is armed only when all is well and you agree. It rises to the
-start pose, squats, hops, sinks down and stops. Any key but those for the height stops it at once, as do
-Ctrl-C, SIGTERM and the end of the terminal; a second signal brakes and leaves. A stop stays until
-you call this again. Everything is recorded, also when the process is killed:
+start pose, squats, hops, sinks down and stops. Any key but those for the height stops it at once,
+as do Ctrl-C, SIGTERM and the end of the terminal; a second signal brakes and leaves. A stop stays
+until you call this again. Everything is recorded, also when the process is killed:
 `hop report figures` reads the trace, or the flight recording that a killed run leaves behind.
 
 CONTROLLER is a name (fast, paper, energy-shaping), a policy (.onnx), a gain file (.toml), a Python

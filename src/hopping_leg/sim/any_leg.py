@@ -172,7 +172,7 @@ def draw_leg(seed: int) -> Twin:
     if seed < 0:
         raise UsageError(f"A seed of {seed} has no meaning; give 0 or more.")
     rng, base = np.random.default_rng([seed, 0]), _base()
-    robot = _draw(_scale(base, rng), (*GROUND, *FRICTION), rng)
+    robot = _within_drives(_draw(_scale(base, rng), (*GROUND, *FRICTION), rng))
     tree: Tree = {"name": f"leg-{seed}", "description": f"leg {seed}, drawn"}
     armatures = {f"{joint}.armature": {"value": 0.0, "unit": "kg m2"} for joint in JOINTS}
     for path, entry in (*numbers(load_tree(BASE)), *armatures.items()):
@@ -244,6 +244,18 @@ def _scale(base: Robot, rng: np.random.Generator) -> Robot:
         factors["friction"] = factors["damping"] = mass * length
         for what, times in factors.items():
             robot = replace_at(robot, f"{name}.{what}", times * attrgetter(f"{name}.{what}")(base))
+    return robot
+
+
+def _within_drives(robot: Robot) -> Robot:
+    """Return the leg with motors no stronger than the currents of its drives make them."""
+    for name in JOINTS:
+        motor, servo = getattr(robot, name).motor, getattr(robot.hardware, name)
+        most = servo.torque_constant * servo.max_current * motor.gear_ratio
+        share = min(most / motor.peak_torque, 1.0)
+        for torque in ("torque_limit", "peak_torque", "rated_torque"):
+            value = share * getattr(motor, torque)
+            robot = replace_at(robot, f"{name}.motor.{torque}", value)
     return robot
 
 
