@@ -379,9 +379,6 @@ KINDS = {
 }
 """What makes each kind."""
 
-SLOW = {"recording-parquet": 20}
-"""Kinds of which each file needs a process of its own: one is tried where others try so many."""
-
 
 def main(name, count, first=0):
     """Try seeds and say after each what is wrong; a line that is missing is that of an abort."""

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from hopping_leg import io, parquet
 from hopping_leg.errors import RobotError, TraceError, UsageError
 from hopping_leg.io import write_atomically
+from hopping_leg.parquet import read_parquet
 from hopping_leg.trace import COLUMNS, Trace
 
 VALUES = st.recursive(
@@ -152,7 +153,7 @@ def test_a_whole_file_that_may_hold_too_much_is_read_elsewhere_first(
     tmp_path, monkeypatch, values, tried
 ):
     monkeypatch.setattr(parquet, "MOST_MEMORY", 1 << 20)
-    monkeypatch.setattr(parquet, "_try", lambda _: "it takes more than a MiB")
+    monkeypatch.setattr(parquet._reader, "complaint", lambda _: "it takes more than a MiB")
     path = tmp_path / "run.parquet"
     Trace(pl.DataFrame({"a": values})).save(path)
     assert path.stat().st_size < 1 << 15
@@ -161,6 +162,26 @@ def test_a_whole_file_that_may_hold_too_much_is_read_elsewhere_first(
             Trace.load(path)
     else:
         Trace.load(path)
+
+
+def test_a_file_that_ends_its_reader_is_refused_and_the_next_is_read(tmp_path, monkeypatch):
+    pl.DataFrame({"a": [1.0], "b": ["x"]}).write_parquet(tmp_path / "foreign.parquet")
+    foreign = (tmp_path / "foreign.parquet").read_bytes()
+    monkeypatch.setattr(parquet, "_READER", "import sys; sys.stdin.buffer.read(9)")
+    monkeypatch.setattr(parquet, "_reader", parquet._Reader())
+    with pytest.raises(TraceError, match="it is damaged"):
+        read_parquet(foreign, "foreign", TraceError)
+    monkeypatch.undo()
+    reader = parquet._Reader()
+    monkeypatch.setattr(parquet, "_reader", reader)
+    for _ in range(2):
+        assert read_parquet(foreign, "foreign", TraceError)[0].rows() == [(1.0, "x")]
+        reader._process.kill()
+        reader._process.wait()
+    monkeypatch.setattr(parquet, "_SECONDS", 0.2)
+    monkeypatch.setattr(parquet, "_READER", "import time; time.sleep(60)")
+    with pytest.raises(TraceError, match=r"takes more than 0\.2 s"):
+        read_parquet(foreign, "foreign", TraceError)
 
 
 def test_a_failed_write_leaves_the_old_file_whole(tmp_path):

@@ -1,16 +1,20 @@
 """Parquet files, of which none may end the process or take its memory.
 
 polars believes what a file says of itself: a damaged one may panic, abort or ask for all memory. So
-our own files hold their SHA-256, which tells damage, and any other one is read in a process of its
-own first. A few bytes may hold many equal rows, in a whole file, too: those are counted first.
+our own files hold their SHA-256, which tells damage, and any other one is read in another process
+first. A few bytes may hold many equal rows, in a whole file, too: those are counted first.
 """
 
+import atexit
 import hashlib
 import io
+import json
 import os
 import re
 import subprocess
 import sys
+import threading
+import time
 
 import polars as pl
 
@@ -25,18 +29,20 @@ _ZEROS = b"0" * 64
 _DIGEST = re.compile(_KEY.encode() + rb"\x18\x40([0-9a-f]{64})")
 _SECONDS = 120.0
 _NUMBER = 8  # bytes
-_TRIAL = """
-import io, resource, sys
+_READER = """
+import io, json, resource, sys
 import polars as pl
-content, most = sys.stdin.buffer.read(), int(sys.argv[1])
+most = int(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_AS, (2 * most, 2 * most))
-try:
-    pl.read_parquet_metadata(io.BytesIO(content))
-    if pl.read_parquet(io.BytesIO(content)).estimated_size() > most:
-        raise OSError(f"it takes more than {most >> 30} GiB")
-except (pl.exceptions.PolarsError, OSError) as error:
-    print(error)
-    sys.exit(3)
+while size := int.from_bytes(sys.stdin.buffer.read(8), "little"):
+    content, said = sys.stdin.buffer.read(size), ""
+    try:
+        pl.read_parquet_metadata(io.BytesIO(content))
+        if pl.read_parquet(io.BytesIO(content)).estimated_size() > most:
+            said = f"it takes more than {most >> 30} GiB"
+    except (pl.exceptions.PolarsError, OSError) as error:
+        said = str(error).partition("\\n")[0].rstrip(".") or "it is damaged"
+    print(json.dumps(said), flush=True)
 """
 
 
@@ -59,7 +65,7 @@ def read_parquet(
         zeroed = content[:at] + _ZEROS + content[at + 64 :]
         if hashlib.sha256(zeroed).hexdigest().encode() != found[-1][1]:
             raise error(f"{origin} is not a readable Parquet file: its checksum does not fit.")
-    if complaint := "" if found and _is_small(content) else _try(content):
+    if complaint := "" if found and _is_small(content) else _reader.complaint(content):
         raise error(f"{origin} is not a readable Parquet file: {complaint}.")
     metadata = pl.read_parquet_metadata(io.BytesIO(content))
     return pl.read_parquet(io.BytesIO(content)), metadata
@@ -74,17 +80,69 @@ def _is_small(content: bytes) -> bool:
     return rows * len(kinds) * _NUMBER <= MOST_MEMORY
 
 
-def _try(content: bytes) -> str:
-    """Return what is wrong with a file, or nothing, as a process of its own finds out."""
+class _Reader:
+    """A process that reads files first; one that a file has ended is followed by another."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._owner = 0  # a fork must not share it
+        self._lock = threading.Lock()
+        atexit.register(self._end)
+
+    def complaint(self, content: bytes) -> str:
+        """Return what is wrong with a file, or nothing."""
+        if not content:
+            return "it is empty"
+        with self._lock:
+            process = self._running()
+            begin, said = time.monotonic(), b""
+            timer = threading.Timer(_SECONDS, process.kill)
+            timer.start()
+            try:
+                said = _ask(process, content)
+            finally:
+                timer.cancel()
+                if not said:
+                    self._end()
+            if said:
+                return str(json.loads(said))
+            late = time.monotonic() - begin >= _SECONDS
+            return f"it takes more than {_SECONDS:g} s" if late else "it is damaged"
+
+    def _running(self) -> subprocess.Popen[bytes]:
+        process = self._process
+        if process is None or self._owner != os.getpid() or process.poll() is not None:
+            process = _start_reader()
+            self._process, self._owner = process, os.getpid()
+        return process
+
+    def _end(self) -> None:
+        if self._process is not None and self._owner == os.getpid():
+            self._process.kill()
+            self._process.communicate()
+        self._process = None
+
+
+def _start_reader() -> subprocess.Popen[bytes]:
     environment = {**os.environ, "POLARS_MAX_THREADS": "1", "RUST_BACKTRACE": "0"}
-    words = [sys.executable, "-c", _TRIAL, str(MOST_MEMORY)]
+    words = [sys.executable, "-c", _READER, str(MOST_MEMORY)]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(
+        words, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, env=environment
+    )
+
+
+def _ask(process: subprocess.Popen[bytes], content: bytes) -> bytes:
+    """Return what a reader says of a file; nothing if that has ended it."""
+    assert process.stdin is not None
+    assert process.stdout is not None
     try:
-        done = subprocess.run(
-            words, input=content, capture_output=True, timeout=_SECONDS, env=environment
-        )
-    except subprocess.TimeoutExpired:
-        return f"it takes more than {_SECONDS:g} s"
-    if done.returncode == 0:
-        return ""
-    said = done.stdout.decode(errors="replace").partition("\n")[0].rstrip(".")
-    return said if done.returncode == 3 and said else "it is damaged"
+        process.stdin.write(len(content).to_bytes(8, "little") + content)
+        process.stdin.flush()
+    except BrokenPipeError:
+        return b""
+    said = process.stdout.readline()
+    return said if said.endswith(b"\n") else b""
+
+
+_reader = _Reader()

@@ -77,6 +77,7 @@ def _unwrap_time(inspection: Inspection, time: Array) -> None:
         inspection.set("time_s", time)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def _tick(steps: Array, period: float) -> float:
     """Return what a clock counts in, s, where rows are no whole number of that apart, else 0."""
     sizes = np.unique(steps / period)
