@@ -12,7 +12,7 @@ NOT_CERTIFIED = (
     "a computer that sends wrong torques without being late, e.g. by broken memory",
     "people: nothing sees them; keep a hand on the switch",
     "mechanical failures: a loose screw, a torn belt, a broken link",
-    "a hip's gear that is off by less than a factor of two, a mirrored leg and a belt that skips,"
+    "a hip's gear that is off by a factor of two or less, a mirrored leg and a belt that skips,"
     " see the supervisor's page",
 )
 """What the trials do not show."""
