@@ -75,6 +75,11 @@ def test_a_hip_that_turns_the_other_way_never_hops(emulated, tmp_path, homed):
     assert np.isnan(done.trace.column("hip_command_nm")).all()
     right = run(emulated(), tmp_path / "right.parquet", rise=2.0, checked=LEG)
     assert right.outcome.supervisor.stop_cause.reason is Reason.FINISHED
+    for trace, upright in ((done.trace, False), (right.trace, True)):
+        (event,) = (event for event in trace.header["events"] if "squat" in event)
+        part, time = trace.column("part"), trace.column("time_s")
+        assert event["time_s"] == pytest.approx(time[part == Part.SQUAT][-1] + 0.005, abs=0.006)
+        assert (abs(event["squat"]["sideways"]) < 0.2) == upright
 
 
 def test_healthy_drives_pass_every_check_and_say_who_they_are(emulated):

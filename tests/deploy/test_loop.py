@@ -88,6 +88,7 @@ def test_a_controller_that_fails_damps_the_leg_and_its_words_are_kept(
     assert outcome.supervisor.stop_cause.reason is reason
     events = trace.header["events"]
     assert [e["controller_error"] for e in events if "controller_error" in e] == said
+    assert all(0 <= e["time_s"] <= trace.column("time_s")[-1] for e in events)
     assert np.isfinite([out.torque for out in link.told]).all()
 
 

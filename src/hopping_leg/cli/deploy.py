@@ -77,6 +77,7 @@ def run(args: Deploy) -> None:
     options.say(
         *done.notices,
         *(event["fallback"] for event in events if "fallback" in event),
+        *(_squatted(event["squat"]["upward"]) for event in events if "squat" in event),
         f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out.",
     )
     options.say_written(done.path)
@@ -87,6 +88,10 @@ def run(args: Deploy) -> None:
         raise HardwareError(" ".join(filter(None, words)))
     if done.complaint:
         raise TraceError(done.complaint)
+
+
+def _squatted(upward: float) -> str:
+    return f"In its squat the leg carried {upward:.0%} of its file's weight."
 
 
 def _emulated(args: Deploy, cause: stop_reasons.Cause) -> str:

@@ -8,7 +8,7 @@ frame costs one tick at most and the drives' watchdogs are fed twice a tick.
 import math
 import threading
 import traceback
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from hopping_leg.controllers.protocol import SAMPLES, Controller, Measurement
 from hopping_leg.deploy import flight_recorder, realtime, safety_limits, stop_reasons
 from hopping_leg.deploy.drive_link import BRAKE, STOP, DriveCommand, DriveLink, Exchange, Reply
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceStep
+from hopping_leg.deploy.standing_check import SquatFindings
 from hopping_leg.deploy.supervisor import State, SupervisorState, supervise
 from hopping_leg.errors import ControllerError
 from hopping_leg.robot.parameters import JOINTS
@@ -129,6 +130,8 @@ class ControlLoop:
         self._internals = _internal_names(sequence.controller)
         self._stop, self._complaint = threading.Event(), ""
         self._asked, self._took, self._abandoned = math.inf, 0.0, False
+        self._start = 0.0
+        sequence.report = self._note_squat
         if isinstance(sequence.controller, Fallback):
             sequence.controller.report = self._note_fallback
 
@@ -148,7 +151,7 @@ class ControlLoop:
 
     def run(self) -> LoopOutcome:
         """Arm, run the sequence, damp, stop; return when the drives have been told to stop."""
-        start = self._clock.now() + self._limits.period
+        start = self._start = self._clock.now() + self._limits.period
         state, held = SupervisorState(since=start), STOP
         tick = ticks = skipped = stops_sent = 0
         stepped = 1
@@ -244,7 +247,7 @@ class ControlLoop:
             self._complaint = traceback.format_exception_only(error)[-1].strip()
             if isinstance(error, ControllerError):
                 self._complaint = str(error)
-            self._recorder.event(time_s=time, controller_error=self._complaint)
+            self._recorder.event(time_s=time - self._start, controller_error=self._complaint)
             return SequenceStep((0.0, 0.0), command, Part.DONE), unknown
         finally:
             self._took, self._asked = self.waited, math.inf
@@ -252,7 +255,10 @@ class ControlLoop:
                 raise SystemExit
 
     def _note_fallback(self, sentence: str) -> None:
-        self._recorder.event(time_s=self._asked, fallback=sentence)
+        self._recorder.event(time_s=self._asked - self._start, fallback=sentence)
+
+    def _note_squat(self, findings: SquatFindings) -> None:
+        self._recorder.event(time_s=self._asked - self._start, squat=asdict(findings))
 
     def _read_internals(self) -> list[float]:
         found = self._sequence.controller.internals()

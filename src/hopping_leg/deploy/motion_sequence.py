@@ -4,6 +4,7 @@ Rising and sinking are minimum-jerk paths under the joint PD; the rise begins wh
 the gains fade out before its end. The paper's soft limits stay in force throughout.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
@@ -13,7 +14,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.controllers import command_schedule, joint_pd, protocol
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.deploy.drive_link import Pair
-from hopping_leg.deploy.standing_check import Squat
+from hopping_leg.deploy.standing_check import Squat, SquatFindings
 from hopping_leg.robot import Robot, kinematics
 
 _ROUNDING = 1e-6  # Rounding of tick times, s; far less than a tick
@@ -110,6 +111,7 @@ class MotionSequence:
         gains: Joint PD of rising and sinking.
         checked: Robot as which the leg must stand and squat before it hops, see
             ``standing_check``; None does not look, as for a leg whose foot is off the ground.
+        report: Called with what the squat looked like.
     """
 
     controller: protocol.Controller
@@ -119,6 +121,7 @@ class MotionSequence:
     timing: SequenceTiming = field(default_factory=SequenceTiming)
     gains: joint_pd.JointGains = field(default_factory=joint_pd.JointGains)
     checked: Robot | None = None
+    report: Callable[[SquatFindings], None] = lambda _: None
 
     def __post_init__(self) -> None:
         self._squat: Squat | None = None
@@ -151,8 +154,9 @@ class MotionSequence:
         if phase is not self._phase and phase in (Part.SINK, Part.DONE):
             self._from = q.copy()
         if self._squat is not None and self._phase is Part.SQUAT and phase is not Part.SQUAT:
-            trouble = self._squat.findings().complaint(self._squat.robot)
-            if trouble:
+            findings = self._squat.findings()
+            self.report(findings)
+            if trouble := findings.complaint(self._squat.robot):
                 return SequenceStep((0.0, 0.0), self.command(time), phase, trouble=trouble)
         if phase is Part.HOP and self._phase is not Part.HOP:
             self.controller.reset(1)
