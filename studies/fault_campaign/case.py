@@ -28,7 +28,7 @@ from studies.fault_campaign.verdict import Limits
 HEIGHTS = (0.25, 0.30, 0.35)
 """Commanded heights, m; each trial takes one."""
 
-_TIMING = SequenceTiming(hop=0.0, rise=0.3, squat=0.0, settle=0.1)
+_TIMING = SequenceTiming(hop=0.0, rise=0.3, settle=0.1)
 _FIRST_HOP = 0.6
 """Time that the first lift-off may take, s."""
 _AFTERWARDS = 0.3
@@ -149,7 +149,7 @@ class Scene:
                 SequenceTiming() if self.family.grounded else _TIMING,
                 hop=_FIRST_HOP + self.mishap.at + _AFTERWARDS,
             ),
-            checked=self.robot,
+            checked=self.robot if self.family.grounded else None,
         )
         self.require_fitness(link)
         done = perform(

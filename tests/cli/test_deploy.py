@@ -35,6 +35,7 @@ def test_deploy_checks_runs_and_leaves_a_trace(emulate, tmp_path, capsys):
     assert main([*RUN, "--schedule", "0.25:0.1,0.3:0.2", "--yes", "--out", str(tmp_path)]) == 0
     (file,) = tmp_path.iterdir()
     out = capsys.readouterr().out
+    assert "In its squat the leg carried" in out
     assert "The sequence is over." in out
     assert file.name in out
     trace = Trace.load(file)

@@ -39,7 +39,7 @@ def starts(robot, wiring, rng):
     allowed = np.transpose(hopping_limits(robot, 200.0).start)
     stops = np.transpose([[j.stop_lower, j.stop_upper] for j in (robot.hip, robot.knee)])
     found = []
-    for _ in range(4000):
+    while len(found) < COUNT:
         foot = length * np.array([rng.uniform(0.4, 0.98), rng.uniform(-0.15, 0.15)])
         side = rng.choice([-1, 1])  # to which the knee bends
         true = side * kinematics.joint_angles(robot, foot * [1, side])
@@ -49,15 +49,14 @@ def starts(robot, wiring, rng):
         limits, pose = np.stack([allowed, stops]), np.stack([believed, true])
         if (limits[:, 0] <= pose).all() and (pose <= limits[:, 1]).all():
             found.append((true, believed))
-    assert len(found) >= COUNT
-    return np.swapaxes(found[:COUNT], 0, 1)
+    return np.swapaxes(found, 0, 1)
 
 
 def share_that_may_hop(robot, wiring, *, truth=None, seed=0):
     """Let legs rise and squat whose drives believe another motion of the joints than the true."""
     true, believed = starts(robot, wiring, np.random.default_rng(seed))
     offset = believed - true @ wiring.T
-    legs = LegSimulator(truth or robot, COUNT, rate=200, timestep=2.5e-4, threads=1)
+    legs = LegSimulator(truth or robot, COUNT, rate=200, threads=1)
     legs.stand(slice(None), true)
     schedule, poses = CommandSchedule(((0.3, 100.0),)), hopping_poses(robot)
     sequences = [

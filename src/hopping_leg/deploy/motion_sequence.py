@@ -127,7 +127,7 @@ class MotionSequence:
         self._squat: Squat | None = None
         if self.checked is None:
             self.timing = replace(self.timing, squat=0.0)
-        elif self.timing.squat:
+        else:
             self._squat = Squat(self.checked, self.poses.start, self.gains, self.timing.squat)
         self._began: float | None = None
         self._from, self._phase = np.zeros(2), Part.WAIT

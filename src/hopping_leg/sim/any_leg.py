@@ -113,6 +113,7 @@ NOISES = tuple(
 )
 """On top of the paper's."""
 
+_TORQUES = ("torque_limit", "peak_torque", "rated_torque")
 _SHAPE, _TORQUE, _SPEED, _GEAR = (0.8, 1.25), (0.75, 1.5), (0.9, 1.5), (0.6, 1.6)
 """Over leg V2's, scaled: centres of mass and inertias, torques, no-load speeds, armatures."""
 
@@ -236,7 +237,7 @@ def _scale(base: Robot, rng: np.random.Generator) -> Robot:
     strength = min(max(length * mass, _WEAKEST), _STRONGEST)
     for name in JOINTS:
         factors = dict.fromkeys(
-            (f"motor.{what}" for what in ("torque_limit", "peak_torque", "rated_torque")),
+            (f"motor.{what}" for what in _TORQUES),
             strength * factor(_TORQUE),
         )
         factors["motor.no_load_speed"] = factor(_SPEED) / math.sqrt(length)
@@ -253,7 +254,7 @@ def _within_drives(robot: Robot) -> Robot:
         motor, servo = getattr(robot, name).motor, getattr(robot.hardware, name)
         most = servo.torque_constant * servo.max_current * motor.gear_ratio
         share = min(most / motor.peak_torque, 1.0)
-        for torque in ("torque_limit", "peak_torque", "rated_torque"):
+        for torque in _TORQUES:
             value = share * getattr(motor, torque)
             robot = replace_at(robot, f"{name}.motor.{torque}", value)
     return robot
