@@ -5,23 +5,20 @@ same page with everything inside, for a disk. Modules name each other ``live/NAM
 map in the page says where those are.
 """
 
+import base64
 import dataclasses
 import json
 from importlib import resources
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
 import jinja2
+import numpy as np
+import wasm
 
 from hopping_leg.colours import controller_colours
 from hopping_leg.controllers import registry, robot_numbers
-from hopping_leg.controllers.energy_shaping.gains import (
-    FORCES,
-    POWERS_OF_SIZE,
-    load_gains,
-    own_gains,
-)
-from hopping_leg.controllers.mpc import HopShape
+from hopping_leg.controllers.energy_shaping import EnergyShaping
 from hopping_leg.controllers.observation_history import OBSERVATION_HISTORIES, AnyLeg, Dated
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
@@ -32,31 +29,25 @@ from hopping_leg.robot import (
     TIMESTEP,
     Robot,
     SoftLimits,
+    command_limits,
     load_robot,
     shipped_robots,
 )
-from hopping_leg.robot.model import (
-    FRICTION_IMPEDANCE,
-    FRICTION_TIME_CONSTANT,
-    STOP_IMPEDANCE,
-    STOP_TIME_CONSTANT,
-)
-from hopping_leg.robot.parameters import DEFAULT_STOPS, PAPER_HEIGHT
+from hopping_leg.robot.parameters import PAPER_HEIGHT
 from hopping_leg.sim import CONTROL_RATE, NoiseAndDelay
 from hopping_leg.sim.channel import DELAY_DEPTH
+from hopping_leg.sim.leg_physics import ROWS
+from hopping_leg.sim.leg_table import LEG, leg_table
+from hopping_leg.sim.stepper import COMMAND, MEMORY
 from hopping_leg.viewer import live_settings
 from hopping_leg.viewer.live_leg import PUSH_SECONDS
 
 FOLDER = Path(__file__).parent / "live"
 MODULES = sorted(file.stem for file in FOLDER.glob("*.js"))
-CONTROLLERS = (
-    "fast", registry.ENERGY_SHAPING, "universal", registry.MPC_TRUE_STATE, "precise", "paper",
-)  # fmt: skip
+CONTROLLERS = ("fast", registry.ENERGY_SHAPING, "universal", "precise", "paper")
 """In the order of the lists; the first two hop first."""
 
 _PACKAGE = resources.files("hopping_leg")
-_COMPUTED = ("armature", "stop_lower", "stop_upper")
-"""What the package computes where a file leaves it out, and so does the page."""
 
 
 def pages() -> dict[str, bytes]:
@@ -84,23 +75,18 @@ def data(policies: dict[str, str]) -> dict[str, Any]:
     """Return what the page's modules know of the package; policies by their addresses."""
     robots = {name: load_robot(name) for name in shipped_robots()}
     legs = {name: robot for name, robot in robots.items() if robot.kind == "leg"}
-    usual = robots[DEFAULT_ROBOT]
-    stretched = usual.thigh.length + usual.shank.length
     return {
         "rate": CONTROL_RATE,
         "timestep": TIMESTEP,
         "gravity": GRAVITY,
-        "start_share": RolloutConfig(usual).standing_length / stretched,
         "flight_clearance": FLIGHT_CLEARANCE,
         "delay_depth": DELAY_DEPTH,
-        "stop": {
-            "time_constant": STOP_TIME_CONSTANT,
-            "impedance": STOP_IMPEDANCE[1],
-            "reach": DEFAULT_STOPS,
-        },
-        "dry_friction": {
-            "time_constant": FRICTION_TIME_CONSTANT,
-            "impedance": FRICTION_IMPEDANCE[0],
+        "stepper": {
+            "code": base64.b64encode(wasm.stepper_module()).decode(),
+            "row": _places(LEG),
+            "memory": _places(MEMORY),
+            "command": COMMAND,
+            "rows": 5 * ROWS,
         },
         "noise": dataclasses.asdict(NoiseAndDelay()),
         "soft_limits": dataclasses.asdict(SoftLimits()),
@@ -111,17 +97,11 @@ def data(policies: dict[str, str]) -> dict[str, Any]:
         },
         "push_seconds": PUSH_SECONDS,
         "robot": DEFAULT_ROBOT,
-        "robots": {name: numbers(robot) for name, robot in legs.items()},
-        "fields": dict(fields(Robot)),
+        "robots": {name: of_robot(robot) for name, robot in legs.items()},
         "layouts": {
             name: {"lags": history.LAGS, "torque_lags": history.TORQUE_LAGS}
             for name, history in OBSERVATION_HISTORIES.items()
             if issubclass(history, Dated)
-        },
-        "shaping": {
-            "gains": _gains(),
-            "powers_of_size": POWERS_OF_SIZE,
-            "forces": FORCES,
         },
         "any_leg": {
             "layout": AnyLeg.name,
@@ -131,14 +111,8 @@ def data(policies: dict[str, str]) -> dict[str, Any]:
             "foot_middle": AnyLeg.FOOT_MIDDLE.tolist(),
             "foot_gain": AnyLeg.FOOT_GAIN,
             "velocity_gain": AnyLeg.VELOCITY_GAIN,
-            "full_torque": robot_numbers.FULL_TORQUE.tolist(),
-            "scales": robot_numbers.MIDDLES_AND_SPREADS.tolist(),
-            "least": robot_numbers.LEAST,
-            "most": robot_numbers.MOST,
-            "usual": robot_numbers.USUAL,
             "straight_height": PAPER_HEIGHT,
         },
-        "shape": dataclasses.asdict(HopShape()),
         "controllers": CONTROLLERS,
         "colours": controller_colours(CONTROLLERS),
         "other_colour": controller_colours([*CONTROLLERS, "a visitor's"])["a visitor's"],
@@ -146,43 +120,34 @@ def data(policies: dict[str, str]) -> dict[str, Any]:
     }
 
 
-def numbers(robot: Robot) -> dict[str, float]:
-    """Return every number of a robot that the physics depends on, by its path in a robot file."""
-    return dict(_flat(dataclasses.asdict(robot), ""))
-
-
-def _flat(tree: dict[str, Any], prefix: str) -> Any:  # noqa: ANN401
-    for key, value in tree.items():
-        if isinstance(value, dict) and prefix + key != "hardware":
-            yield from _flat(value, f"{prefix}{key}.")
-        elif isinstance(value, float):
-            yield prefix + key, value
-
-
-def fields(kind: type, prefix: str = "") -> Any:  # noqa: ANN401
-    """Yield the numbers that a robot file may hold: paths, units, what is valid, defaults."""
-    hints = get_type_hints(kind)
-    for field in dataclasses.fields(kind):
-        path, unit = prefix + field.name, field.metadata.get("unit")
-        if unit is not None:
-            entry: dict[str, Any] = dict(field.metadata)
-            if field.default is not dataclasses.MISSING:
-                known = field.default is not None and field.name not in _COMPUTED
-                entry["default"] = field.default if known else None
-            yield path, entry
-        elif dataclasses.is_dataclass(hints[field.name]) and path != "hardware":
-            yield from fields(hints[field.name], f"{path}.")
-
-
-def _gains() -> dict[str, Any]:
-    """Return the tuned sets of gains: the one for all legs, and those of some leg alone."""
-    robots = [load_robot(name) for name in shipped_robots()]
-    names = {own_gains(registry.ENERGY_SHAPING, robot) for robot in robots}
-    found = {name: load_gains(name) for name in sorted(names | {registry.ENERGY_SHAPING})}
-    return {
-        name: {"robot": one.robot, "gains": dataclasses.asdict(one.gains)}
-        for name, one in found.items()
+def of_robot(robot: Robot) -> dict[str, Any]:
+    """Return a robot's parameters and what the package computes of them."""
+    shaping = registry.load_controller(registry.ENERGY_SHAPING, robot)
+    assert isinstance(shaping, EnergyShaping)
+    return _told(dataclasses.asdict(robot)) | {
+        "row": np.frombuffer(leg_table([robot], TIMESTEP).tobytes()).tolist(),
+        "start": RolloutConfig(robot).start_posture.tolist(),
+        "heights": command_limits(robot),
+        "gains": {name: float(value) for name, value in vars(shaping.gains).items()},
+        "numbers": robot_numbers.robot_numbers(robot).tolist(),
+        "full_torque": robot_numbers.full_torque(robot).tolist(),
+        "fall_time": robot_numbers.fall_time(robot),
     }
+
+
+def _told(tree: dict[str, Any]) -> dict[str, Any]:
+    """Return a tree of parameters without what a file leaves out and what drives are called."""
+    return {
+        name: _told(value) if isinstance(value, dict) else value
+        for name, value in tree.items()
+        if value is not None and name not in ("hardware", "path", "description")
+    }
+
+
+def _places(kind: np.dtype[Any]) -> dict[str, tuple[int, int]]:
+    """Return where the fields of a record of float64 begin, and how many numbers each holds."""
+    fields = {name: (field[1], field[0].itemsize) for name, field in (kind.fields or {}).items()}
+    return {name: (offset // 8, size // 8) for name, (offset, size) in fields.items()}
 
 
 def _policies() -> list[str]:

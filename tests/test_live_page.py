@@ -16,7 +16,6 @@ from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.rollout import RolloutConfig, rollout
 from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import TIMESTEP, load_robot, shipped_robots
-from hopping_leg.robot.robot_files import load_tree, robot_text
 from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.leg_table import LEG, leg_table
 from hopping_leg.viewer.live_settings import LiveSettings
@@ -62,7 +61,7 @@ def address(site):
 
 def ask(page, body, argument=None):
     """Evaluate the body of a function of (the page's modules, an argument)."""
-    names = ["leg", "mpc", "onnx", "plant", "policy", "robot", "shaping", "stepper", "table"]
+    names = ["leg", "onnx", "plant", "policy", "robot", "shaping", "stepper"]
     imports = ", ".join(f'import("live/{name}.js")' for name in names)
     return page.evaluate(
         "async (argument) => { const modules = Object.assign({}, ..."
@@ -72,10 +71,7 @@ def ask(page, body, argument=None):
     )
 
 
-PUBLIC = (
-    "Leg, Plant, Policy, EnergyShaping, TrueStateMpc, changedRobot, legTable, makeMemory,"
-    " readRobot, shippedRobot, stepLeg"
-)
+PUBLIC = "Leg, Plant, Policy, EnergyShaping, Stepper, changedRow, ofRow, shippedRobot"
 """What the tests take from the page's modules."""
 
 
@@ -89,13 +85,13 @@ def test_tables_are_those_of_the_package(page, address):
         found = ask(
             page,
             "const settings = { payload: 0.4, ground: 0.03, delay: 0.01 };"
-            "const robot = changedRobot(shippedRobot(argument[0]), settings);"
-            "return legTable(robot, argument[1]);",
-            [name, TIMESTEP],
+            "const row = changedRow(shippedRobot(argument[0]), settings);"
+            "return Object.fromEntries(argument[1].map((name) => [name, [...ofRow(row, name)]]));",
+            [name, list(LEG.names)],
         )
         for field in LEG.names:
-            if field != "fixed_base":
-                np.testing.assert_allclose(found[field], row[field], 1e-12, 1e-15, err_msg=field)
+            values = np.atleast_1d(row[field])
+            np.testing.assert_allclose(found[field], values, 1e-12, 1e-15, err_msg=field)
 
 
 def ticks_of(robot, states, torques):
@@ -123,13 +119,13 @@ def test_ticks_in_air_and_contact_are_those_of_the_package(page, address, name):
     found = ask(
         page,
         "const [name, dt, states, torques] = argument;"
-        "const table = legTable(shippedRobot(name), dt);"
+        "const { row } = shippedRobot(name), [latency] = ofRow(Float64Array.from(row),"
+        "  'command_latency');"
         "return states.map((values, i) => {"
-        "  const state = Float64Array.from(values), memory = makeMemory();"
-        "  memory.rotor.set([state[1], state[2], state[4], state[5]]);"
-        "  memory.pending = [{ arrival: table.command_latency, torque: torques[i] }];"
-        "  stepLeg(table, state, memory, [], 0, 40, dt);"
-        "  return [...state];"
+        "  const leg = new Stepper(0), [, q1, q2, , w1, w2] = values;"
+        "  leg.row.set(row); leg.state.set(values); leg.rotor.set([q1, q2, w1, w2]);"
+        "  leg.step(torques[i], latency, 0, 40, dt);"
+        "  return [...leg.state];"
         "});",
         [name, TIMESTEP, states.tolist(), torques.tolist()],
     )
@@ -144,7 +140,6 @@ RUN = """
 const [name, robotName, command, noise, ticks, channel, sensors, jitter, bytes] = argument;
 const robot = shippedRobot(robotName);
 const controller = name === "energy-shaping" ? new EnergyShaping(name, robot)
-  : name === "mpc-true-state" ? new TrueStateMpc(robot)
   : new Policy(Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0)), name, robot);
 const draws = { channel: () => channel.shift(), sensors: () => sensors.shift(),
   jitter: () => jitter.shift() };
@@ -180,7 +175,6 @@ def draws_of(seed, noisy, jitters):
         ("paper", "legv2-paper", 2),
         ("energy-shaping", "legv2-identified", 2),
         ("energy-shaping", "legv1", 2),
-        ("mpc-true-state", "legv2-identified", 3),
         ("fast", "twin", 1),
         ("energy-shaping", "twin", 2),
     ],
@@ -212,51 +206,6 @@ def test_first_hops_are_those_of_the_package_with_the_same_draws(
 
 
 @pytest.mark.slow
-def test_a_visitors_files_are_read_as_the_package_reads_them(page, address, tmp_path):
-    page.goto(address)
-    number = '{{ value = {}, unit = "{}", source = "scale" }}'
-    text = "\n".join(
-        [
-            'name = "mine" # a comment',
-            'extends = "legv2-paper"',
-            "[base]",
-            f"mass = {number.format('1_100e-3', 'kg')}",
-            "[hip]",
-            f"belt_ratio = {number.format('1.5', '1')}",
-            f"motor.rated_torque = {number.format('5', 'N m')}",
-            "[hardware.hip]",
-            f"id = {number.format('3', '1')}",
-        ]
-    )
-    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
-    row = leg_table([load_robot(tmp_path / "mine.toml")], TIMESTEP)[0]
-    found = ask(
-        page, "return legTable(readRobot(argument[0], 'mine.toml'), argument[1]);", [text, TIMESTEP]
-    )
-    for field in LEG.names:
-        if field != "fixed_base":
-            np.testing.assert_allclose(found[field], row[field], 1e-12, 1e-15, err_msg=field)
-    whole = robot_text(load_tree("twin") | {"name": "twin-2"})
-    assert ask(page, "return readRobot(argument, 'twin.toml').hip.motor.gear_ratio;", whole) == 6
-    for broken, sentence in (
-        (text.replace('"kg"', '"g"'), "mine.toml: 'base.mass' is in 'g' but must be in 'kg'."),
-        (text.replace("1_100e-3", "-1"), "mine.toml: 'base.mass' is -1 kg but must be more than"),
-        (text.replace("mine", "legv2", 1), "mine.toml: 'legv2' is a shipped robot"),
-        (text.replace("mass", "maß"), "mine.toml: line 4 is no TOML that this page reads"),
-        (text.replace("[base]", "[body]"), "mine.toml: 'body.mass' is no number of a robot"),
-        (text.replace('"legv2-paper"', '"other.toml"'), "'extends' is 'other.toml', which this"),
-        (whole.replace("value = 0.95,", "value = 1.95,"), "must be at most"),
-        (text.replace('extends = "legv2-paper"', ""), "mine.toml: 'base.radius' is missing"),
-    ):
-        said = ask(
-            page,
-            "try { readRobot(argument, 'mine.toml'); } catch (e) { return e.message; }",
-            broken,
-        )
-        assert sentence in said, said
-
-
-@pytest.mark.slow
 def test_the_page_obeys_and_keeps_pace(page, address, tmp_path):
     page.goto(address)
     page.wait_for_function("performance.getEntriesByName('first hop').length")
@@ -269,21 +218,18 @@ def test_the_page_obeys_and_keeps_pace(page, address, tmp_path):
     page.locator("h1").click()
     page.keyboard.press("k")
     assert page.locator("#height-value").inner_text() in ("0.355 m", "0.360 m")
-    robot = robot_text({"name": "heavier", "extends": "legv2-identified"})
     policy = (resources.files("hopping_leg") / "policies/paper.onnx").read_bytes()
-    page.locator("#file").set_input_files(
-        [{"name": "heavier.toml", "mimeType": "text/plain", "buffer": robot.encode()}]
-    )
-    page.get_by_text("fast was trained on legv2-identified, not on heavier.").wait_for()
+    page.get_by_label("Robot", exact=True).select_option("legv2")
+    page.get_by_text("fast was trained on legv2-identified, not on legv2.").wait_for()
     page.locator("#file").set_input_files(
         [{"name": "mine.onnx", "mimeType": "application/octet-stream", "buffer": policy}]
     )
-    page.get_by_text("mine.onnx was trained on legv2-paper, not on heavier.").wait_for()
+    page.get_by_text("mine.onnx was trained on legv2-paper, not on legv2.").wait_for()
     page.locator("#file").set_input_files(
         [{"name": "bad.onnx", "mimeType": "application/octet-stream", "buffer": policy[:999]}]
     )
     page.get_by_text("bad.onnx cannot be read as a policy.").wait_for()
-    for name in ("universal", "mpc-true-state", "precise", "energy-shaping", "paper", "fast"):
+    for name in ("universal", "precise", "energy-shaping", "paper", "fast"):
         page.get_by_label("Controller", exact=True).select_option(name)
         page.locator("article .name").get_by_text(name, exact=True).first.wait_for()
     took = ask(

@@ -3,7 +3,7 @@
 // (q1, q2, qd1, qd2), rad and rad/s; histories are newest first.
 
 import { DATA, PERIOD } from "live/data.js";
-import { fallTime, fullTorque, legLength, robotNumbers } from "live/numbers.js";
+import { legLength } from "live/robot.js";
 
 const WINDOW = 11; // ticks in which a late sample may still reach a `DatedObserver`
 
@@ -100,15 +100,14 @@ class AnyLeg extends Dated {
   constructor(lags, robot) {
     super(lags);
     this.robot = robot;
-    this.numbers = Float32Array.from(robotNumbers(robot));
-    this.fullTorque = Float32Array.from(fullTorque(robot));
+    this.numbers = Float32Array.from(robot.numbers);
+    this.fullTorque = Float32Array.from(robot.full_torque);
   }
 
   inputs() {
     const { q, qd, age, past_torque: torques, command: [height] } = super.inputs();
     const { late, middle, command_gain: gain } = DATA.any_leg;
-    const full = fullTorque(this.robot);
-    const time = fallTime(this.robot);
+    const { full_torque: full, fall_time: time } = this.robot;
     const feet = this.track ? this.lags.map((lag) => this.footMotion(this.track.samples[lag])) : [];
     const above = (height - this.robot.foot.radius) / legLength(this.robot);
     return {
@@ -130,7 +129,7 @@ class AnyLeg extends Dated {
     const share = this.robot.thigh.length / legLength(this.robot);
     const [s1, c1] = [share * Math.sin(q1), share * Math.cos(q1)];
     const [s2, c2] = [(1 - share) * Math.sin(q1 + q2), (1 - share) * Math.cos(q1 + q2)];
-    const scale = ofVelocity * fallTime(this.robot);
+    const scale = ofVelocity * this.robot.fall_time;
     return [
       gain * (c1 + c2 - middle[0]),
       gain * (s1 + s2 - middle[1]),

@@ -29,8 +29,3 @@ export function jointAngles({ thigh: { length: thigh }, shank: { length: shank }
 
 // Base height if the foot stands on flat, hard ground, m.
 export const stanceHeight = (robot, q) => footPosition(robot, q)[0] + robot.foot.radius;
-
-// The standing start of every run.
-export const startPosture = (robot, share) => (
-  jointAngles(robot, share * (robot.thigh.length + robot.shank.length))
-);

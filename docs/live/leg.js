@@ -2,40 +2,22 @@
 // `LiveLeg` in `src/hopping_leg/viewer/live_leg.py`, with its hops.
 
 import { DATA, PERIOD } from "live/data.js";
-import { startPosture } from "live/kinematics.js";
 import { Plant, RANDOM } from "live/plant.js";
 
 const FLIGHT_CLEARANCE = DATA.flight_clearance; // foot clearance that counts as flight, m
 const IMPOSSIBLE = 1e4; // joint speed that no leg reaches, rad/s
 const KEPT = Math.round(10 / PERIOD); // rows of the past
 
-// Return a robot with a visitor's settings: payload, kg, ground's time constant, s, delay, s.
-export function changedRobot(robot, { payload, ground, delay }) {
-  const { base, contact, reality } = robot;
-  const { latency, ground: truth = {} } = reality;
-  const told = "time_constant" in truth;
-  return {
-    ...robot,
-    base: { ...base, mass: base.mass + payload },
-    contact: { ...contact, time_constant: ground },
-    reality: {
-      ...reality,
-      ground: told ? { ...truth, time_constant: ground } : truth,
-      latency: { ...latency, command: latency.command + delay },
-    },
-  };
-}
-
 export class Leg {
   constructor(controller, robot, settings, command, draws = RANDOM) {
     this.robot = robot;
-    this.plant = new Plant(changedRobot(robot, settings), !settings.noise, draws);
+    this.plant = new Plant(robot, settings, draws);
     this.stand(command, controller);
   }
 
   // Begin anew, standing.
   stand(command, controller = this.controller) {
-    this.plant.leg.stand(startPosture(this.robot, DATA.start_share));
+    this.plant.leg.stand(this.robot.start);
     this.past = []; // rows of (command, height, hip torque, knee torque, apex or NaN)
     this.command = command;
     this.deepest = 0; // that the foot sank in, m
@@ -46,7 +28,6 @@ export class Leg {
   setController(controller) {
     this.controller = controller;
     controller.reset();
-    controller.watch?.(this.plant.leg);
     this.plant.restart(this.command);
     this.apexes = []; // highest of each flight, m
     this.rose = this.flying = false;
@@ -54,8 +35,7 @@ export class Leg {
 
   // Change the settings in the present state; the controller is not told.
   setSettings(settings) {
-    this.plant.leg.setRobot(changedRobot(this.robot, settings));
-    this.plant.setQuiet(!settings.noise);
+    this.plant.set(settings);
     this.plant.restart(this.command);
   }
 

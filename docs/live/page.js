@@ -4,10 +4,9 @@ import { DATA, JOINTS, PERIOD, PageError, clamp } from "live/data.js";
 import { Leg } from "live/leg.js";
 import { drawPlots } from "live/plots.js";
 import { Policy } from "live/policy.js";
-import { readRobot, shippedRobot } from "live/robot.js";
+import { groundOf, shippedRobot } from "live/robot.js";
 import { drawScene, pageColours } from "live/scene.js";
 import { EnergyShaping } from "live/shaping.js";
-import { TrueStateMpc } from "live/mpc.js";
 
 const NONE = "none";
 const HEADROOM = 0.11; // above the highest command, m: half a base and a little, of a leg like V2
@@ -18,7 +17,6 @@ const PLOT_EVERY = 3; // pictures
 
 const $ = (id) => document.getElementById(id);
 
-const robots = new Map(Object.keys(DATA.robots).map((name) => [name, shippedRobot(name)]));
 const policies = new Map(); // bytes of the policies that were loaded or opened, by name
 let legs = []; // {leg, colour, card} each
 let command = 0.3;
@@ -49,7 +47,6 @@ async function policyBytes(name) {
 
 async function makeController(name, robot) {
   if (name === "energy-shaping") return new EnergyShaping(name, robot);
-  if (name === "mpc-true-state") return new TrueStateMpc(robot);
   return new Policy(await policyBytes(name), name, robot);
 }
 
@@ -62,7 +59,7 @@ const settings = () => ({
 
 // Let the chosen controllers begin on the chosen robot; the former legs hop on until all are there.
 async function begin() {
-  const robot = robots.get($("robot").value);
+  const robot = shippedRobot($("robot").value);
   const names = ["first", "second"].map((id) => $(id).value).filter((name) => name !== NONE);
   const own = ++choice;
   const controllers = await Promise.all(names.map((name) => makeController(name, robot)));
@@ -105,9 +102,8 @@ function showSettings() {
 
 // Set the ground to what the robot's file says.
 function ownGround() {
-  const { contact, reality } = robots.get($("robot").value);
   const [low, high] = DATA.ranges.ground;
-  const own = clamp(reality.ground?.time_constant ?? contact.time_constant, low, high);
+  const own = clamp(groundOf(shippedRobot($("robot").value)), low, high);
   $("ground").value = Math.log10(own);
 }
 
@@ -198,28 +194,15 @@ async function attempt(work) {
 
 async function open(file) {
   const { name } = file; // with its ending, so that no shipped policy has it
-  if (name.endsWith(".onnx")) {
-    const bytes = new Uint8Array(await file.arrayBuffer());
-    void new Policy(bytes, name, robots.get($("robot").value)); // refused before it is listed
-    policies.set(name, bytes);
-    choose("first", name);
-  } else if (name.endsWith(".toml")) {
-    const robot = readRobot(await file.text(), name);
-    robots.set(robot.name, robot);
-    choose("robot", robot.name);
-    ownGround();
-  } else throw new PageError(`${name} is neither a policy (.onnx) nor a robot (.toml).`);
-  showSettings();
-  await begin();
-}
-
-// Choose a name in a list, which gets it if it is new.
-function choose(id, name) {
-  const lists = id === "robot" ? [$("robot")] : [$("first"), $("second")];
-  for (const list of lists) {
+  if (!name.endsWith(".onnx")) throw new PageError(`${name} is no policy (.onnx).`);
+  const bytes = new Uint8Array(await file.arrayBuffer());
+  void new Policy(bytes, name, shippedRobot($("robot").value)); // refused before it is listed
+  policies.set(name, bytes);
+  for (const list of [$("first"), $("second")]) {
     if (![...list.options].some((option) => option.value === name)) list.add(new Option(name, name));
   }
-  $(id).value = name;
+  $("first").value = name;
+  await begin();
 }
 
 const KEYS = {
@@ -240,7 +223,7 @@ function connect() {
     $("second").add(new Option(name, name));
   }
   $("second").add(new Option("nothing", NONE), 0);
-  for (const name of robots.keys()) $("robot").add(new Option(name, name));
+  for (const name of Object.keys(DATA.robots)) $("robot").add(new Option(name, name));
   for (const [id, [low, high], scale] of [
     ["payload", DATA.ranges.payload, 1], ["delay", DATA.ranges.delay, 1000],
     ["ground", DATA.ranges.ground.map(Math.log10), 1],

@@ -5,8 +5,8 @@
 
 import { DATA, JOINTS, PERIOD, clamp } from "live/data.js";
 import { stanceHeight } from "live/kinematics.js";
-import { makeMemory, readSensors, send, stepLeg } from "live/stepper.js";
-import { legTable } from "live/table.js";
+import { changedRow } from "live/robot.js";
+import { Stepper, ofRow } from "live/stepper.js";
 
 const STEPS = Math.round(PERIOD / DATA.timestep);
 
@@ -20,36 +20,41 @@ export const RANDOM = {
 };
 
 export class SimulatedLeg {
-  constructor(robot, draws) {
+  constructor(robot, settings, draws) {
+    this.robot = robot;
     this.draws = draws;
-    this.state = new Float64Array(6); // (x, q1, q2) and their rates, m, rad, s
     this.push = 0; // upward on the base, N
-    this.setRobot(robot);
+    this.set(settings);
   }
 
-  // Go on as another robot with the same sensors in the present state; commands stay under way.
-  setRobot(robot) {
-    this.robot = robot;
-    this.table = legTable(robot, DATA.timestep);
-    const { table } = this;
-    this.late = table.measurement_latency > 0;
-    this.noisy = table.sensor_noise.some(Boolean);
-    this.disturbed = this.late || this.noisy
-      || [...table.sensor_step, ...table.elastic].some(Boolean);
+  // Go on with other settings in the present state; commands stay under way.
+  set(settings) {
+    this.row = changedRow(this.robot, settings);
+    this.stepper?.row.set(this.row);
   }
+
+  // A number, or the two of the joints, of the leg's row.
+  of(name) { return ofRow(this.row, name); }
 
   // Stand at rest at joint angles, rad; the foot touches the ground by a nanometre.
   stand(q) {
-    this.state.set([stanceHeight(this.robot, q) - 1e-9, q[0], q[1], 0, 0, 0]);
-    this.memory = makeMemory();
-    this.memory.rotor.set([q[0], q[1], 0, 0]);
-    this.reading = Float64Array.of(q[0], q[1], 0, 0, 0, 0);
-    const depth = 2 + Math.ceil(this.table.measurement_latency / DATA.timestep);
-    this.past = Array.from({ length: this.late ? depth : 0 }, () => this.reading.slice());
-    this.table.sensor_step.forEach((step, i) => {
-      if (step > 0) this.reading[i] = Math.round(this.reading[i] / step) * step;
+    const [late] = this.of("measurement_latency");
+    this.noisy = this.of("sensor_noise").some(Boolean);
+    this.disturbed = late > 0 || this.noisy || this.of("sensor_step").some(Boolean)
+      || this.of("elastic").some(Boolean);
+    this.stepper = new Stepper(late > 0 ? 2 + Math.ceil(late / DATA.timestep) : 0);
+    const { row, state, rotor, reading, past, depth } = this.stepper;
+    row.set(this.row);
+    state.set([stanceHeight(this.robot, q) - 1e-9, q[0], q[1], 0, 0, 0]);
+    rotor.set([q[0], q[1], 0, 0]);
+    for (const seen of [...Array(depth).keys()]) past.set(rotor, 6 * seen);
+    reading.set(rotor);
+    this.of("sensor_step").forEach((step, i) => {
+      if (step > 0) reading[i] = Math.round(reading[i] / step) * step;
     });
   }
+
+  get state() { return this.stepper.state; } // (x, q1, q2) and their rates, m, rad, s
 
   get height() { return this.state[0]; }
 
@@ -61,20 +66,17 @@ export class SimulatedLeg {
   // What the encoders report: (q1, q2, their rates), rad, rad/s.
   get measured() {
     const [, q1, q2, , w1, w2] = this.state;
-    return this.disturbed ? this.reading.subarray(0, 4) : [q1, q2, w1, w2];
+    return this.disturbed ? this.stepper.reading.subarray(0, 4) : [q1, q2, w1, w2];
   }
 
   // Command joint torques for a control period; return what the motors gave, N m.
   step(torque) {
-    const { table, memory } = this;
-    const late = table.command_jitter ? this.draws.jitter() * table.command_jitter : 0;
-    send(memory, torque, table.command_latency + late);
-    stepLeg(table, this.state, memory, this.past, this.push, STEPS, DATA.timestep);
-    if (this.disturbed) {
-      const draws = this.noisy ? this.draws.sensors() : [];
-      readSensors(table, memory, this.past, draws, this.reading, DATA.timestep);
-    }
-    return memory.mean_torque;
+    const { stepper } = this;
+    const [jitter] = this.of("command_jitter");
+    const late = jitter ? this.draws.jitter() * jitter : 0;
+    stepper.step(torque, this.of("command_latency")[0] + late, this.push, STEPS, DATA.timestep);
+    if (this.disturbed) stepper.read(this.noisy ? this.draws.sensors() : [], DATA.timestep);
+    return stepper.meanTorque;
   }
 }
 
@@ -126,13 +128,16 @@ class Channel {
 
 // A leg behind a channel, with the soft joint limits on the newest sample that controllers see.
 export class Plant {
-  constructor(robot, quiet, draws = RANDOM) {
-    this.leg = new SimulatedLeg(robot, draws);
+  constructor(robot, settings, draws = RANDOM) {
+    this.leg = new SimulatedLeg(robot, settings, draws);
     this.draws = draws;
-    this.setQuiet(quiet);
+    this.set(settings);
   }
 
-  setQuiet(quiet) { this.channel = new Channel(quiet, this.draws); }
+  set(settings) {
+    this.leg.set(settings);
+    this.channel = new Channel(!settings.noise, this.draws);
+  }
 
   restart(command) {
     const [, q1, q2, , w1, w2] = this.leg.state;

@@ -2,8 +2,8 @@
 
 import { DATA, PageError } from "live/data.js";
 import { makeHistory } from "live/history.js";
-import { legLength } from "live/numbers.js";
 import { readOnnx, runOnnx } from "live/onnx.js";
+import { legLength } from "live/robot.js";
 
 export class Policy {
   // Read an ONNX file's bytes; messages name it. It is told the robot's numbers if it asks for them.

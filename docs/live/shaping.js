@@ -4,7 +4,6 @@
 import { DATA, JOINTS, PERIOD, clamp } from "live/data.js";
 import { DatedObserver } from "live/history.js";
 import { footPosition, jacobian, jointAngles } from "live/kinematics.js";
-import { commandLimits, shippedRobot } from "live/robot.js";
 
 const SHORTEST_PUSH = 0.02; // least length of a push, m
 const STEP = [0.7, 1.4]; // bounds of E_d / E_{j-1}
@@ -19,32 +18,6 @@ export const TOUCHDOWN = 2;
 
 const massOf = ({ base, thigh, shank }) => base.mass + thigh.mass + shank.mass;
 const median = (values) => values.toSorted((a, b) => a - b)[(values.length - 1) / 2];
-
-// Inertia about hip and knee with the knee bent by a right angle, kg m2.
-function jointInertia({ thigh, shank, hip, knee }) {
-  const ofKnee = shank.inertia + shank.mass * shank.com ** 2;
-  const ofHip = thigh.inertia + thigh.mass * thigh.com ** 2 + ofKnee
-    + shank.mass * thigh.length ** 2;
-  return [ofHip + hip.armature, ofKnee + knee.armature];
-}
-
-// Carry gains over from the leg `origin` to another, see `gains.py`.
-export function scaleGains(gains, origin, robot) {
-  const reach = ({ thigh, shank }) => thigh.length + shank.length;
-  const size = reach(robot) / reach(origin);
-  const scaled = { ...gains };
-  for (const [name, power] of Object.entries(DATA.shaping.powers_of_size)) {
-    scaled[name] *= size ** power;
-  }
-  for (const name of DATA.shaping.forces) scaled[name] *= massOf(robot) / massOf(origin);
-  JOINTS.forEach((joint, i) => {
-    const factor = jointInertia(robot)[i] / jointInertia(origin)[i];
-    const damped = gains[`${joint}_damping`] + origin[joint].damping;
-    scaled[`${joint}_stiffness`] *= factor;
-    scaled[`${joint}_damping`] = Math.max(damped * factor - robot[joint].damping, 0);
-  });
-  return scaled;
-}
 
 // The path of least jerk from 0 to 1, and its derivative.
 function smoothStep(share) {
@@ -61,12 +34,10 @@ export class EnergyShaping {
   constructor(name, robot) {
     this.name = name;
     this.robot = robot;
-    const files = DATA.shaping.gains;
-    const { gains, robot: origin } = files[`${name}-${robot.name}`] ?? files[name];
-    this.gains = scaleGains(gains, shippedRobot(origin), robot);
+    this.gains = robot.gains;
     const { thigh: { length: thigh }, shank: { length: shank }, knee } = robot;
     this.longest = Math.sqrt(thigh ** 2 + shank ** 2 + 2 * thigh * shank * Math.cos(knee.upper));
-    this.range = commandLimits(robot);
+    this.range = robot.heights;
     this.reset();
   }
 
