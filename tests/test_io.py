@@ -13,10 +13,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hopping_leg import io, parquet
+from hopping_leg import io
 from hopping_leg.errors import RobotError, TraceError, UsageError
 from hopping_leg.io import write_atomically
-from hopping_leg.parquet import read_parquet
 from hopping_leg.trace import COLUMNS, Trace
 
 VALUES = st.recursive(
@@ -144,44 +143,14 @@ def test_missing_and_foreign_files_are_refused(tmp_path):
         Trace.load(foreign)
 
 
-@pytest.mark.parametrize(
-    ("values", "tried"),
-    [(pl.zeros(1 << 16, eager=True), False), (pl.zeros(1 << 18, eager=True), True)]
-    + [(pl.Series([value]), True) for value in ("text", [0.0])],
-)
-def test_a_whole_file_that_may_hold_too_much_is_read_elsewhere_first(
-    tmp_path, monkeypatch, values, tried
-):
-    monkeypatch.setattr(parquet, "MOST_MEMORY", 1 << 20)
-    monkeypatch.setattr(parquet._reader, "complaint", lambda _: "it takes more than a MiB")
+def test_a_cut_or_empty_trace_is_refused_in_a_sentence(tmp_path):
     path = tmp_path / "run.parquet"
-    Trace(pl.DataFrame({"a": values})).save(path)
-    assert path.stat().st_size < 1 << 15
-    if tried:
-        with pytest.raises(TraceError, match="takes more than a MiB"):
+    some_trace().save(path)
+    whole = path.read_bytes()
+    for end in (0, 3, len(whole) // 2, len(whole) - 1):
+        path.write_bytes(whole[:end])
+        with pytest.raises(TraceError, match=r"not a readable Parquet file: [^\n]+\.$"):
             Trace.load(path)
-    else:
-        Trace.load(path)
-
-
-def test_a_file_that_ends_its_reader_is_refused_and_the_next_is_read(tmp_path, monkeypatch):
-    pl.DataFrame({"a": [1.0], "b": ["x"]}).write_parquet(tmp_path / "foreign.parquet")
-    foreign = (tmp_path / "foreign.parquet").read_bytes()
-    monkeypatch.setattr(parquet, "_READER", "import sys; sys.stdin.buffer.read(9)")
-    monkeypatch.setattr(parquet, "_reader", parquet._Reader())
-    with pytest.raises(TraceError, match="it is damaged"):
-        read_parquet(foreign, "foreign", TraceError)
-    monkeypatch.undo()
-    reader = parquet._Reader()
-    monkeypatch.setattr(parquet, "_reader", reader)
-    for _ in range(2):
-        assert read_parquet(foreign, "foreign", TraceError)[0].rows() == [(1.0, "x")]
-        reader._process.kill()
-        reader._process.wait()
-    monkeypatch.setattr(parquet, "_SECONDS", 0.2)
-    monkeypatch.setattr(parquet, "_READER", "import time; time.sleep(60)")
-    with pytest.raises(TraceError, match=r"takes more than 0\.2 s"):
-        read_parquet(foreign, "foreign", TraceError)
 
 
 def test_a_failed_write_leaves_the_old_file_whole(tmp_path):

@@ -3,6 +3,7 @@
 Stored as Parquet with the header in the file's metadata; nothing is ever unpickled.
 """
 
+import io
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,9 +13,8 @@ import numpy as np
 import polars as pl
 
 from hopping_leg.arrays import Array
-from hopping_leg.errors import TraceError
+from hopping_leg.errors import HoppingLegError, TraceError
 from hopping_leg.io import parse_json, write_atomically
-from hopping_leg.parquet import read_parquet, to_parquet
 
 SCHEMA = 1
 """Version of the layout, stored in every header."""
@@ -37,6 +37,18 @@ COLUMNS = {
     "base_clearance_m": "gap between base and ground",
 }
 """Every column a trace may rely on; controllers may add their own."""
+
+
+def read_parquet(
+    content: bytes, origin: str, error: type[HoppingLegError]
+) -> tuple[pl.DataFrame, dict[str, str]]:
+    """Return a Parquet file's table and metadata; ``error`` says what polars finds wrong."""
+    try:
+        metadata = pl.read_parquet_metadata(io.BytesIO(content))
+        return pl.read_parquet(io.BytesIO(content)), metadata
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as problem:
+        said = str(problem).partition("\n")[0].rstrip(".") or "it is damaged"
+        raise error(f"{origin} is not a readable Parquet file: {said}.") from problem
 
 
 @dataclass(frozen=True)
@@ -72,7 +84,9 @@ class Trace:
     def save(self, path: Path) -> None:
         """Write the trace; an existing file is replaced only once the new one is complete."""
         header = json.dumps({"schema": SCHEMA, **self.header}, sort_keys=True)
-        write_atomically(path, to_parquet(self.table, {"hopping_leg": header}))
+        file = io.BytesIO()
+        self.table.write_parquet(file, metadata={"hopping_leg": header})
+        write_atomically(path, file.getvalue())
 
     @staticmethod
     def load(path: Path) -> "Trace":

@@ -21,8 +21,7 @@ from hopping_leg.identify import importers, recording_checks, unit_checks
 from hopping_leg.identify.csv_table import read_csv
 from hopping_leg.identify.recording_format import COLUMNS, PAIRS, RecordingMetadata, float_column
 from hopping_leg.io import parse_toml, read_dataclass
-from hopping_leg.parquet import read_parquet
-from hopping_leg.trace import Trace
+from hopping_leg.trace import Trace, read_parquet
 
 _KEY, _PARQUET = "recording", b"PAR1"
 
