@@ -8,7 +8,7 @@ import math
 import textwrap
 from typing import Any
 
-from macros_results import grid, not_stored, number, read, stored, table
+from macros_results import grid, number
 from studies.fault_campaign.families import FAMILIES
 
 from hopping_leg.cli.robots import derived
@@ -98,42 +98,6 @@ def stages(recipe: str) -> str:
     return grid(["stage", "until", "score", "at most, mm"], rows)
 
 
-def search_space(recipe: str) -> str:
-    """Return what `hop tune` searches of a recipe as a table."""
-    from hopping_leg.rl.recipes import SPACES, get_recipe
-    from hopping_leg.rl.search_space import OneOf
-
-    rows, shipped = [], get_recipe(recipe)
-    for name, found in SPACES[recipe].items():
-        if isinstance(found, OneOf):
-            where = ", ".join(str(found.stored(choice)) for choice in found.choices)
-        else:
-            values = dataclasses.asdict(found)  # type: ignore[call-overload]
-            where = "{low:g} to {high:g}".format(**values) + (", log" if values["log"] else "")
-        rows.append([f"`{name}`", where, str(found.stored(shipped.value(name)))])
-    return grid(["number", "searched", "recipe"], rows)
-
-
-def searched(file: str, figures: dict[str, str]) -> str:
-    """Return the trials and figures of a search, if its space is still that of the recipe.
-
-    Args:
-        file: Name of the result.
-        figures: File of a figure to its title.
-    """
-    from hopping_leg.rl.recipes import SPACES
-
-    study = file.split("/")[0]
-    content = read(file) if stored(file) else {"space": {}}
-    if set(content["space"]) != set(SPACES.get(content.get("recipe"), {"": None})):
-        return not_stored(study)
-    names = [f"params.{name}={name}" for name in content["space"]]
-    rows = table(file, "trials", "number=trial", "score_m*1000=score, mm", *names, state="complete")
-    return rows + "".join(
-        f"\n![{title}](results/{study}/{name})\n" for name, title in figures.items()
-    )
-
-
 def twin_ranges() -> str:
     """Return the distribution of twins as a table."""
     rows = [
@@ -187,8 +151,6 @@ MACROS = {
     "hyperparameters": hyperparameters,
     "robot": robot,
     "robustness_axes": robustness_axes,
-    "search_space": search_space,
-    "searched": searched,
     "stages": stages,
     "trace_columns": trace_columns,
     "twin_ranges": twin_ranges,

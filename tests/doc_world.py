@@ -42,8 +42,9 @@ SHORTER = {
     "hop train --recipe universal": {
         "--steps": "1", "--heights": "0.28 0.32", "--set": "num_envs=64 batch_size=1024",
     },
-    "hop tune": {"--trials": "1", "--steps": "1", "--workers": "1", "--snapshots": "1"},
-    "hop tune energy-shaping": {"--generations": "1", "--population": "4", "--seconds": "3"},
+    "python -m studies.energy_shaping.tune": {
+        "--generations": "1", "--population": "4", "--seconds": "3",
+    },
     "hop view": {"--no-browser": None, "--port": "0", "--seconds": "0.5"},
 }  # fmt: skip
 """Options that replace or join those of every command with these words; of several entries the one
@@ -56,7 +57,6 @@ SECONDS = {
 """Lengths of the paper's trials, which have no option."""
 
 ELSEWHERE = {
-    "hop finetune": "minutes even when small: tests/cli/test_finetune.py",
     **dict.fromkeys(
         ("hop policies push", "hop policies pull", "hop policies list --hub"),
         "a hub: tests/controllers/test_policy_hub.py",

@@ -41,7 +41,7 @@ WAIT = 600
 RUNNABLE = [page for page in PAGES if any(b.language in ("bash", "python") for b in blocks(page))]
 
 
-WITH_KINDS = ("excite", "export", "policies", "robots", "tune")
+WITH_KINDS = ("excite", "export", "policies", "robots")
 """Verbs whose options depend on the next word."""
 
 

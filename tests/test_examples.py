@@ -14,7 +14,7 @@ EXAMPLES = Path(__file__).parent.parent / "examples"
 NOTEBOOKS = pytest.mark.parametrize(
     "path", sorted((EXAMPLES / "notebooks").glob("*.ipynb")), ids=lambda p: p.stem
 )
-ARGUMENTS = {"train_your_own": ["16384"], "custom_reward": ["1024"]}
+ARGUMENTS = {"train_your_own": ["16384"], "custom_reward": ["1024"], "tune": ["1", "1024"]}
 """What makes the long ones short."""
 
 

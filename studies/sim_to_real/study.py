@@ -8,8 +8,6 @@ from typing import Any, ClassVar, Literal
 
 from hopping_leg import io
 from hopping_leg.controllers.energy_shaping.gains import load_gains
-from hopping_leg.controllers.energy_shaping.tuning import Search as GainSearch
-from hopping_leg.controllers.energy_shaping.tuning import tune
 from hopping_leg.controllers.registry import ENERGY_SHAPING
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.identify import cost, optimizers, plan
@@ -31,6 +29,8 @@ from hopping_leg.sim_to_real.twins import (
     drawn_twin,
     given_twin,
 )
+from studies.energy_shaping.tuning import Search as GainSearch
+from studies.energy_shaping.tuning import tune
 
 Search = Literal["least-squares", "two-pass", "one-pass"]
 

@@ -6,13 +6,13 @@ from tests.extras import TRAINING, run_without
 
 
 def test_what_is_missing_or_too_old_is_named_unless_for_another_platform():
-    lines = ["numpy>=1", "no-such-package>=2; extra == 'view'", "numpy>=999; extra == 'tune'"]
+    lines = ["numpy>=1", "no-such-package>=2; extra == 'view'", "numpy>=999; extra == 'bench'"]
     lines.append("no-such-package; platform_machine == 'pdp11' and extra == 'pi3hat'")
     found = missing_requirements(lines)
     assert set(found) == set(PURPOSES)
     assert {extra: missing for extra, missing in found.items() if missing} == {
         "view": ["no-such-package>=2"],
-        "tune": ["numpy>=999"],
+        "bench": ["numpy>=999"],
     }
 
 
@@ -39,7 +39,7 @@ def test_drives_cannot_be_changed_without_a_transport(refused):
 
 
 OPTIONAL = [
-    *(*TRAINING, "optuna", "sqlalchemy", "ray"),
+    *(*TRAINING, "ray"),
     *("moteus", "can", "serial", "msgpack", "pybullet", "viser", "playwright"),
 ]
 HARDWARE = "pip install 'hopping-leg[hardware]'"

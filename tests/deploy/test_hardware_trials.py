@@ -12,11 +12,11 @@ import pytest
 from numba.core import event
 
 from hopping_leg.controllers.command_schedule import CommandSchedule
-from hopping_leg.controllers.registry import load_controller, load_policy
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.drive_info import configure, home, inspect
 from hopping_leg.deploy.drive_link import BRAKE
 from hopping_leg.deploy.flight_recorder import recover
-from hopping_leg.deploy.hardware_trials import DeployedRobot, header_of, perform
+from hopping_leg.deploy.hardware_trials import header_of, perform
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.preflight import check_drives, require_fit, required_settings
 from hopping_leg.deploy.safety_limits import hopping_limits
@@ -210,42 +210,6 @@ def test_each_fault_ends_the_run_for_its_reason_and_nothing_starts_again(
 
 
 SCHEDULE = CommandSchedule(((0.3, 1.0), (0.25, 0.5)))
-
-
-def deployed(tmp_path, lockstep, ready=lambda seconds: None):
-    link = contextlib.nullcontext(lockstep.link)
-    return DeployedRobot(LEG, 200.0, tmp_path, lambda: link, lambda _: {}, ready, lockstep)
-
-
-@pytest.mark.slow
-def test_a_trial_holds_the_hops_alone_and_counts_all_of_its_time(emulated, tmp_path):
-    lockstep = emulated()
-    asked = []
-    policy = load_policy("fast")
-    trial = deployed(tmp_path, lockstep, asked.append).hop(policy, SCHEDULE, 1)
-    assert asked == [1.5]
-    assert not trial.complaint
-    assert len(trial.trace.table) == 300
-    assert trial.seconds > 1.5 + 2.0 + 1.5
-    assert trial.truth is None
-    command = trial.trace.column("command_m")
-    np.testing.assert_allclose(command[[0, -1]], [0.3, 0.25])
-    torque = [trial.trace.column(f"{joint}_command_nm") for joint in ("hip", "knee")]
-    assert np.abs(torque).max() <= max(policy.card.torque_scale)
-    assert len(list(tmp_path.glob("*.parquet"))) == 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("ticks", [10, 230])
-def test_a_stop_by_the_supervisor_comes_back_as_a_complaint(emulated, tmp_path, ticks):
-    robot = deployed(tmp_path, emulated())
-    if ticks < 200:
-        with pytest.raises(HardwareError, match="before it hopped"):
-            robot.hop(Still(fail_after=ticks), SCHEDULE, 1)
-    else:
-        trial = robot.hop(Still(fail_after=ticks), SCHEDULE, 1)
-        assert "error" in trial.complaint
-        assert len(trial.trace.table) <= ticks + 1
 
 
 class Clock(FakeClock):

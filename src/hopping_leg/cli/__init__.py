@@ -38,8 +38,6 @@ VERBS = {
     "report": "draw stored traces, set stored runs beside each other on a page",
     "train": "train a controller from scratch, or go on after an interruption",
     "policies": "list and inspect policies, share them on the Hugging Face hub",
-    "finetune": "continue a policy's training on the real leg, or on a twin",
-    "tune": "search the gains of energy shaping, or a recipe's numbers",
     "excite": "write the trajectory that a leg is identified with",
     "export": "write a leg as URDF, traces for Foxglove, ROS 2, rerun, LeRobot",
     "record": "play an excitation on a leg and record it",
@@ -60,7 +58,6 @@ MEANT = {
     "evaluate": "simulate sim test eval benchmark run rollout judge measure score",
     "excite": "excitation trajectory",
     "export": "urdf save convert mcap rosbag rerun foxglove lerobot",
-    "finetune": "continue adapt",
     "identify": "calibrate fit sysid estimate system-identification",
     "policies": "onnx hub push pull download upload share inspect",
     "record": "log capture play",
@@ -70,7 +67,6 @@ MEANT = {
     "robustness": "perturb disturb stress benchmark",
     "skills": "stairs land jump",
     "train": "learn fit-policy rl fit",
-    "tune": "optimise optimize search sweep gains hyperparameters",
     "view": "simulate sim watch viewer play render show visualise visualize gui",
     "demo": "try example start hello tutorial",
 }
@@ -166,7 +162,6 @@ def _refused_variable(error: Exception) -> str | None:
 _EXTRAS = {
     **dict.fromkeys(("torch", "stable_baselines3", "onnx", "tensorboard"), "train"),
     **dict.fromkeys(("moteus", "can", "serial", "msgpack"), "hardware"),
-    **dict.fromkeys(("optuna", "sqlalchemy"), "tune"),
     **dict.fromkeys(("mcap", "mcap_ros2"), "ros"),
     "rerun": "rerun",
     "pyarrow": "lerobot",

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 PURPOSES = {
     "train": "train policies (hop train)",
-    "tune": "search a recipe's numbers (hop tune)",
     "view": "watch the leg in the browser (hop view)",
     "hardware": "talk to the drives (hop deploy, hop doctor, hop emulate)",
     "pi3hat": "talk to the drives from a Raspberry Pi with a pi3hat",
@@ -43,7 +42,7 @@ PURPOSES = {
     "hub": "policies on the Hugging Face hub (hop policies)",
     "bullet": "the leg in PyBullet (hop evaluate --engine pybullet)",
     "bench": "mujoco.sysid beside our fits (python -m studies.identification)",
-    "cluster": "identify or tune on a Ray cluster (--ray)",
+    "cluster": "identify or train on a Ray cluster (--ray)",
     "docs": "build the documentation (make docs)",
     "dev": "test and check a clone (make test, make check)",
 }

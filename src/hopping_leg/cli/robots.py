@@ -170,7 +170,7 @@ def _import(args: Import) -> None:
     say_next(
         ["hop", "robots", "check", out],
         ["hop", "view", "universal", "--robot", out],
-        ["hop", "tune", "energy-shaping", "--robot", out, "--out", f"runs/{out.stem}"],
+        ["hop", "evaluate", "universal", "energy-shaping", "--robot", out],
     )
 
 

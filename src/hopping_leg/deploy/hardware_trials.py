@@ -15,17 +15,15 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import polars as pl
-
-from hopping_leg.controllers import command_schedule, hardware_trial, protocol
+from hopping_leg.controllers import protocol
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.deploy import drive_link, flight_recorder, safety_limits, stop_reasons, supervisor
 from hopping_leg.deploy.loop import ControlLoop, LoopOutcome, columns
-from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
+from hopping_leg.deploy.motion_sequence import MotionSequence, Part
 from hopping_leg.deploy.realtime import Clock, RealClock, keeping_time
 from hopping_leg.errors import HardwareError, TraceError
 from hopping_leg.io import safe_file_name, versions
-from hopping_leg.robot import Robot, SoftLimits
+from hopping_leg.robot import Robot
 from hopping_leg.trace import Trace
 
 if TYPE_CHECKING:
@@ -248,74 +246,3 @@ def _stop_signals(loop: ControlLoop) -> Iterator[list[int]]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler or signal.SIG_DFL)
-
-
-@dataclass(frozen=True)
-class DeployedRobot:
-    """A leg behind a wire; implements ``TrialRobot``.
-
-    Attributes:
-        robot: As its file says.
-        rate: Control rate, Hz.
-        folder: For the whole traces.
-        connect: Opens the link to its drives for one trial.
-        check: Refuses drives that are not fit; returns what was found, for the trace.
-        ready: Called before every trial; returns once the operator agrees.
-        clock: The time; none takes the computer's.
-    """
-
-    robot: Robot
-    rate: float
-    folder: Path
-    connect: Callable[[], AbstractContextManager["MoteusLink"]]
-    check: Callable[["MoteusLink"], dict[str, Any]]
-    ready: Callable[[float], None]
-    clock: Clock | None = None
-
-    @property
-    def name(self) -> str:
-        """Name of the robot."""
-        return self.robot.name
-
-    def hop(
-        self, controller: protocol.Controller, schedule: command_schedule.CommandSchedule, seed: int
-    ) -> hardware_trial.HardwareTrial:
-        """Let a controller hop from standing.
-
-        Raises:
-            HardwareError: The operator stopped the leg, or it was stopped before it hopped.
-        """
-        sequence = MotionSequence(
-            controller,
-            schedule,
-            hopping_poses(self.robot),
-            protocol.SoftLimiter(self.robot, SoftLimits()),
-            SequenceTiming(hop=schedule.seconds),
-            checked=self.robot,
-        )
-        with self.connect() as link:
-            found = self.check(link)
-            self.ready(schedule.seconds)
-            done = perform(
-                link,
-                sequence,
-                safety_limits.hopping_limits(self.robot, self.rate),
-                new_path(self.folder, controller.name),
-                header_of(self.robot, controller, self.rate, drives=found, outing_seed=seed),
-                clock=self.clock,
-                realtime=self.clock is None,
-            )
-        cause = done.outcome.supervisor.stop_cause
-        if cause.reason is stop_reasons.Reason.OPERATOR_STOP:
-            raise HardwareError("You stopped the leg; the same command with --resume goes on.")
-        table = done.trace.table
-        hopped = table.filter(
-            pl.col("part") == Part.HOP, pl.col("state") == supervisor.State.RUNNING
-        )
-        if hopped.height < self.rate:
-            raise HardwareError(f"The leg was stopped before it hopped: {cause}")
-        finished = cause.reason is stop_reasons.Reason.FINISHED
-        complaint = done.complaint if finished else f"{cause} {done.complaint}".strip()
-        return hardware_trial.HardwareTrial(
-            Trace(hopped, done.trace.header), table.height / self.rate, complaint
-        )

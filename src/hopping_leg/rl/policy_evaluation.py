@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.hardware_trial import MEASURED
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.controllers.rollout import Rollout, RolloutConfig, rollout
 from hopping_leg.hop_detection import HopMeasurement, measure_hops
 from hopping_leg.rl.onnx_export import CommandMap, with_command_map
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.parameters import JOINTS, Robot
 
 FIRST_SEED = 500
 """Judges every snapshot while training."""
@@ -107,8 +106,10 @@ def input_range(
         scale = controller.scale
     schedule = np.tile(np.multiply(scale, commands), (round(_RANGE_SECONDS * rate), 1))
     run = rollout(controller, RolloutConfig(robot, rate=rate), schedule, FINAL_SEEDS[0])
-    units = {"q": 1.0, "qd": np.sqrt(scale)}
-    columns = [unit * run.data[name] for pair, unit in units.items() for name in MEASURED[pair]]
+    units = {"position_rad": 1.0, "velocity_rad_s": np.sqrt(scale)}
+    columns = [
+        unit * run.data[f"{joint}_{name}"] for name, unit in units.items() for joint in JOINTS
+    ]
     return tuple(float(c.min()) for c in columns), tuple(float(c.max()) for c in columns)
 
 

@@ -186,7 +186,8 @@ def load_gains(name_or_path: str | Path = TUNED) -> GainFile:
         content = source.read_bytes()
     except OSError as error:
         raise errors.UsageError(
-            f"There is no gain file {source}; write one with `hop tune`."
+            f"There is no gain file {source}; write one with"
+            " `python -m studies.energy_shaping.tune`."
         ) from error
     tree = io.parse_toml(content, str(source))
     if "extends" in tree or "thigh" in tree:

@@ -10,20 +10,12 @@ from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.rl.distillation.students import StudentConfig
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes import fast, paper, precise, universal
-from hopping_leg.rl.search_space import SearchSpace
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, Range
 
 RECIPES: Mapping[str, Recipe] = {
     recipe.name: recipe for recipe in (fast.FAST, paper.PAPER, precise.PRECISE, universal.UNIVERSAL)
 }
 """Every recipe that ``hop train`` knows."""
-
-SPACES: Mapping[str, SearchSpace] = {
-    "fast": fast.SEARCH_SPACE,
-    "paper": paper.SEARCH_SPACE,
-    "precise": precise.SEARCH_SPACE,
-}
-"""Recipe to what ``hop tune`` searches."""
 
 Randomise = Literal["none", "twins", "surprises"]
 """Ranges from which each leg in training draws its own numbers."""

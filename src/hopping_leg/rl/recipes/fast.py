@@ -8,7 +8,6 @@ from hopping_leg.envs import TaskConfig
 from hopping_leg.rl import recipe
 from hopping_leg.rl.distillation.dagger import DaggerConfig
 from hopping_leg.rl.distillation.students import StudentConfig
-from hopping_leg.rl.search_space import LAYERS, OneOf, Real, SearchSpace
 
 FAST = recipe.Recipe(
     name="fast",
@@ -30,10 +29,3 @@ FAST = recipe.Recipe(
         calibrations=3,
     ),
 )
-
-SEARCH_SPACE: SearchSpace = {
-    "learning_rate": Real(2e-4, 4e-3, log=True),
-    "hidden": OneOf(LAYERS),
-    "mixing_share": Real(0.0, 0.5),
-    "gradient_steps": OneOf((4, 8, 16, 32)),
-}

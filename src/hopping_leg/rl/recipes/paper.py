@@ -6,9 +6,6 @@ episode and what the critics see are chosen here.
 
 from hopping_leg.envs import PaperRewardConfig, TaskConfig
 from hopping_leg.rl import recipe, sac
-from hopping_leg.rl.search_space import OneOf, Real, SearchSpace
-
-_LAYERS = OneOf(((128, 128), (256, 256), (256, 256, 128, 128)))
 
 PAPER = recipe.Recipe(
     name="paper",
@@ -25,17 +22,3 @@ PAPER = recipe.Recipe(
     selection=recipe.SelectionConfig(eval_every=8_000),
     robot="legv2-paper",
 )
-
-SEARCH_SPACE: SearchSpace = {
-    "learning_rate": Real(1e-4, 3e-3, log=True),
-    "actor": _LAYERS,
-    "critic": _LAYERS,
-    "batch_size": OneOf((128, 256, 512)),
-    "n_steps": OneOf((1, 3, 5)),
-    "tau": Real(1e-3, 2e-2, log=True),
-    "gamma": Real(0.97, 0.997),
-    "train_freq": OneOf((8, 16, 32, 64)),
-    "gradient_steps": OneOf((32, 64, 128, 256)),
-    "target_entropy": Real(-4.0, 0.0),
-    "log_std": Real(-3.5, -1.0),
-}

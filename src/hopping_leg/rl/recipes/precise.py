@@ -9,7 +9,6 @@ from hopping_leg.rl import recipe
 from hopping_leg.rl.distillation.dagger import DaggerConfig
 from hopping_leg.rl.distillation.students import StudentConfig
 from hopping_leg.rl.recipes.fast import FAST
-from hopping_leg.rl.search_space import LAYERS, OneOf, Real, SearchSpace
 
 PRECISE = recipe.Recipe(
     name="precise",
@@ -19,10 +18,3 @@ PRECISE = recipe.Recipe(
     schedule=recipe.Schedule(num_envs=256, steps=7_000_000, log_every=16),
     selection=FAST.selection,
 )
-
-SEARCH_SPACE: SearchSpace = {
-    "learning_rate": Real(2e-4, 4e-3, log=True),
-    "hidden": OneOf((*LAYERS, (512, 256))),
-    "mixing_share": Real(0.0, 0.5),
-    "gradient_steps": OneOf((8, 16, 32)),
-}

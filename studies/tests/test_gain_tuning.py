@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers import RolloutConfig
-from hopping_leg.controllers.energy_shaping import tuned_energy_shaping, tuning
+from hopping_leg.controllers.energy_shaping import tuned_energy_shaping
 from hopping_leg.controllers.energy_shaping.gains import (
     GainFile,
     ShapingGains,
@@ -12,9 +12,10 @@ from hopping_leg.controllers.energy_shaping.gains import (
     save_gains,
     scale_gains,
 )
-from hopping_leg.controllers.energy_shaping.tuning import calibrated, cost, from_unit, to_unit
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
+from studies.energy_shaping import tuning
+from studies.energy_shaping.tuning import calibrated, cost, from_unit, to_unit
 
 GAINS = load_gains().gains
 ROBOT = load_robot("legv2-paper")
@@ -108,7 +109,7 @@ def test_gains_survive_a_file_and_a_bad_one_is_named(tmp_path):
     save_gains(tmp_path / "g.toml", stored)
     assert load_gains(tmp_path / "g.toml") == stored
     (tmp_path / "g.toml").write_text('robot = "a"\nsource = "b"\n[gains]\nk_0 = 1.0')
-    for name, said in (("g.toml", "g.toml.*k_0"), ("missing.toml", "hop tune")):
+    for name, said in (("g.toml", "g.toml.*k_0"), ("missing.toml", r"energy_shaping\.tune")):
         with pytest.raises(UsageError, match=said):
             load_gains(tmp_path / name)
 

@@ -1,8 +1,0 @@
-"""Measure again what the study stores: ``python -m studies.tuning``."""
-
-import sys
-
-from studies.shared import main
-
-if __name__ == "__main__":
-    sys.exit(main("tuning"))
