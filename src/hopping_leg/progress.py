@@ -1,13 +1,10 @@
 """How long work goes: a live bar on a terminal, a line now and then elsewhere."""
 
 import contextlib
-import itertools
 import math
 import threading
 import time
-from bisect import bisect_right
-from collections.abc import Iterator
-from types import TracebackType
+from collections.abc import Callable, Iterator
 from typing import Self
 
 from rich import progress
@@ -17,50 +14,11 @@ from hopping_leg.terminal import plain_console
 _SILENCE = 1.5
 """Time after which work that has said nothing says what it is, s."""
 _LINE_SECONDS = 30.0
-_LEAST_SHARE, _LEAST_SECONDS = 0.02, 3.0
-"""What has to be done before the time left is told."""
-_LATER = 1.2
-"""Ratio of a new reckoning to the time told beyond which that is said to be too short."""
-_MOST_KEPT = 200
+_PACE_SECONDS = 600.0
+"""Latest time whose pace tells the time left, s."""
 
 
-class TimeLeft:
-    """Reckons the time left from the pace of the later half of the time passed.
-
-    What was told once never rises.
-    """
-
-    def __init__(self) -> None:
-        self._times: list[float] = []
-        self._shares: list[float] = []
-        self.told = math.inf
-        """What was told last, s."""
-
-    def reckon(self, passed: float, share: float) -> float:
-        """Return the time left, s, when a share, 0 to 1, is done at a time, s; NaN if unknown."""
-        self._times.append(passed)
-        self._shares.append(share)
-        if len(self._times) > _MOST_KEPT:
-            del self._times[1:-1:2], self._shares[1:-1:2]
-        if share >= 1:
-            return 0.0
-        begun, first = self._times[0], self._shares[0]
-        if share - first < _LEAST_SHARE or passed - begun < _LEAST_SECONDS:
-            return math.nan
-        middle = bisect_right(self._times, (begun + passed) / 2) - 1
-        done = share - self._shares[middle]
-        return (1 - share) * (passed - self._times[middle]) / done if done > 0 else math.inf
-
-    def text(self, left: float) -> str:
-        """Return what to say of a new reckoning, s: nothing if it is unknown."""
-        if math.isnan(left):
-            return ""
-        late = left > _LATER * self.told
-        self.told = min(self.told, left)
-        return f"{'more than' if late else 'about'} {minutes(self.told)} left"
-
-
-class LiveProgress:
+class LiveProgress(contextlib.ExitStack):
     """A bar per label with a note beside it, as a context manager; its heirs say what is noted.
 
     Args:
@@ -68,18 +26,12 @@ class LiveProgress:
         parts: How many labels there will be; 0 if that is unknown.
         quiet: Show nothing.
         lines: Write lines instead of bars; None does so where there is no terminal.
-        first_line: Time until the first line, s.
     """
 
     def __init__(
-        self,
-        title: str = "",
-        *,
-        parts: int = 0,
-        quiet: bool = False,
-        lines: bool | None = None,
-        first_line: float = _SILENCE,
+        self, title: str = "", *, parts: int = 0, quiet: bool = False, lines: bool | None = None
     ) -> None:
+        super().__init__()
         self._console = plain_console(stderr=True, quiet=quiet)
         self._lines = not self._console.is_terminal if lines is None else lines
         self._bar = progress.Progress(
@@ -90,13 +42,14 @@ class LiveProgress:
             progress.TextColumn("{task.fields[note]}", markup=False),
             console=self._console,
             disable=self._lines,
+            speed_estimate_period=_PACE_SECONDS,
+            get_time=lambda: time.monotonic(),
         )
         self._waiting = self._bar.add_task(title, total=None, note="") if title else None
-        self._parts = parts
-        self._tasks: dict[str, tuple[progress.TaskID, float, TimeLeft]] = {}
+        self._parts, self._tasks = parts, dict[str, progress.TaskID]()
         self._began = time.monotonic()
-        self._next_line, self._text = first_line, title
-        self._writing, self._over = threading.Lock(), threading.Event()
+        self.text = title
+        """What the next line says."""
 
     @property
     def passed(self) -> float:
@@ -113,60 +66,44 @@ class LiveProgress:
         *,
         at_once: bool = False,
     ) -> None:
-        """Show a share done, 0 to 1, on the bar of a key, or in a line when one is due.
+        """Show a share done, 0 to 1, on the bar of a key, and in the next line.
 
-        ``left`` is a reckoning of one's own, s; ``at_once`` writes a line in any case.
+        ``left`` is a reckoning of one's own, s; ``at_once`` writes a line now.
         """
         if self._waiting is not None:
             self._bar.remove_task(self._waiting)
             self._waiting = None
         if key not in self._tasks:
-            task = self._bar.add_task(label, total=1.0, note="")
-            self._tasks[key] = task, self.passed, TimeLeft()
-        task, begun, time_left = self._tasks[key]
+            self._tasks[key] = self._bar.add_task(label, total=1.0, note="")
+        task = self._tasks[key]
         if self._parts > 1:
             label = f"{list(self._tasks).index(key) + 1} of {self._parts}: {label}"
+        self._bar.update(task, description=label, completed=share)
         if left is None:
-            left = time_left.reckon(self.passed - begun, share)
-        said = " · ".join(filter(None, (note, time_left.text(left) if share < 1 else "")))
-        self._bar.update(task, description=label, completed=share, note=said)
-        self._text = " · ".join(filter(None, (f"{label} {100 * share:.0f} %".strip(), said)))
+            left = self._left(task)
+        known = share < 1 and math.isfinite(left)
+        note = " · ".join(filter(None, (note, f"about {minutes(left)} left" if known else "")))
+        self._bar.update(task, note=note)
+        self.text = " · ".join(filter(None, (f"{label} {100 * share:.0f} %".strip(), note)))
         if at_once:
-            self._next_line = 0.0
-        self._line_if_due()
+            self._line()
 
-    def _line(self, text: str) -> None:
-        """Write a line now, where lines are written."""
-        if self._lines:
-            self._console.print(text, soft_wrap=True)
+    def _left(self, task: progress.TaskID) -> float:
+        """Return the time left, s, at the pace so far; NaN if that tells nothing."""
+        with contextlib.suppress(OverflowError, ValueError):
+            left = next(t.time_remaining for t in self._bar.tasks if t.id == task)
+            return math.nan if left is None else left
+        return math.nan
 
-    def _line_if_due(self) -> None:
-        """Write how far it is, where lines are written and the last one was long ago."""
-        with self._writing:
-            if self._lines and self._text and self.passed >= self._next_line:
-                self._next_line = self.passed + _LINE_SECONDS
-                self._line(self._text)
-
-    def _keep_writing(self) -> None:
-        while not self._over.wait(_SILENCE):
-            self._line_if_due()
+    def _line(self) -> None:
+        if self._lines and self.text:
+            self._console.print(self.text, soft_wrap=True)
 
     def __enter__(self) -> Self:
         """Start drawing."""
-        self._bar.start()
-        if self._lines:
-            threading.Thread(target=self._keep_writing, daemon=True).start()
+        self.enter_context(self._bar)
+        self.enter_context(_repeated(self._line, _SILENCE))
         return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Stop drawing."""
-        self._over.set()
-        self._bar.stop()
 
 
 class ShareProgress(LiveProgress):
@@ -182,24 +119,30 @@ class ShareProgress(LiveProgress):
 
 
 @contextlib.contextmanager
-def said_if_slow(text: str) -> Iterator[None]:
-    """Say on stderr what is going on: on a terminal soon, elsewhere now and then."""
-    over, began, console = threading.Event(), time.monotonic(), plain_console(stderr=True)
-    first = _SILENCE if console.is_terminal else _LINE_SECONDS
+def _repeated(say: Callable[[], None], first: float) -> Iterator[None]:
+    """Call something after a time, s, and then every 30 s."""
+    over = threading.Event()
 
     def watch() -> None:
-        for wait in itertools.chain([first], itertools.repeat(_LINE_SECONDS)):
-            if over.wait(wait):
-                return
-            passed = time.monotonic() - began
-            since = f" {minutes(passed)} so far." if wait == _LINE_SECONDS else ""
-            console.print(f"{text}{since}", soft_wrap=True)
+        wait = first
+        while not over.wait(wait):
+            say()
+            wait = _LINE_SECONDS
 
     threading.Thread(target=watch, daemon=True).start()
     try:
         yield
     finally:
         over.set()
+
+
+@contextlib.contextmanager
+def said_if_slow(text: str) -> Iterator[None]:
+    """Say on stderr what is going on: on a terminal soon, elsewhere now and then."""
+    console = plain_console(stderr=True)
+    first = _SILENCE if console.is_terminal else _LINE_SECONDS
+    with _repeated(lambda: console.print(text, soft_wrap=True), first):
+        yield
 
 
 def minutes(seconds: float) -> str:

@@ -380,7 +380,7 @@ def test_no_text_of_a_user_is_taken_for_markup(capsys, text):
     with ShareProgress() as bar:
         bar.show(text, 0.5)
     with LiveProgress(text) as progress:
-        progress._line(text)
+        progress._show(text, text, 0.5, at_once=True)
     captured = capsys.readouterr()
     assert captured.out.count(text) == 4
     assert captured.err.count(text) >= 1
