@@ -9,7 +9,7 @@ cd build/wheel
 pip="venv/bin/python -m pip --disable-pip-version-check install -q"
 $pip -c constraints.txt ./*.whl
 venv/bin/python -c 'import hopping_leg, sys; assert "torch" not in sys.modules'
-venv/bin/python -c 'import gymnasium; gymnasium.make("HoppingLeg-v0")'
+venv/bin/python -c 'import gymnasium; gymnasium.make("hopping_leg:HoppingLeg-v0")'
 ../../.venv/bin/uvx --python venv/bin/python --constraints constraints.txt --from ./*.whl hop --version
 ../../.venv/bin/pipx run --no-cache --pip-args="-c $PWD/constraints.txt" --spec "$(echo "$PWD"/*.whl)" hop --version
 venv/bin/hop robots list

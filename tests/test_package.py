@@ -42,7 +42,6 @@ def test_the_source_archive_holds_what_is_installed_and_what_is_to_be_read(archi
     }
     assert {Path(name).suffix for name in inside} >= {".py", ".toml", ".xml", ".onnx", ".j2"}
     assert "src/hopping_leg/py.typed" in inside
-    inside.add("src/hopping_leg.pth")
     read = {"README.md", "CITATION.cff", "CHANGELOG.md", "constraints.txt", "Makefile"}
     read |= set(PROJECT["license-files"])
     read |= {str(path.relative_to(ROOT)) for path in (ROOT / "studies").rglob("*.py")}

@@ -34,7 +34,9 @@ def learn(name: str, robot: Robot, seed: int, minutes: float, snapshots: int) ->
     torch.set_num_threads(2)
     algorithm, count = ALGORITHMS[name]
     began = time.monotonic()
-    env = make_vec_env("HoppingLeg-v0", n_envs=count, seed=seed, env_kwargs={"robot": robot})
+    env = make_vec_env(
+        "hopping_leg:HoppingLeg-v0", n_envs=count, seed=seed, env_kwargs={"robot": robot}
+    )
     model = algorithm("MlpPolicy", env, seed=seed, device="cpu")
     keep = _Keep(name, robot, seed, began, minutes, snapshots)
     model.learn(10**9, callback=keep)

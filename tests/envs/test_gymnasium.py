@@ -319,10 +319,10 @@ def test_vector_env_is_the_batched_task():
 @pytest.mark.parametrize(
     "words",
     [
-        "import gymnasium as g; g.make('HoppingLeg-v0'); g.make('hopping_leg:HoppingLeg-v0')",
+        "import gymnasium; gymnasium.make('hopping_leg:HoppingLeg-v0')",
         "import hopping_leg, gymnasium; gymnasium.make_vec('HoppingLeg-v0', num_envs=2)",
-        "import hopping_leg, sys; assert not {'gymnasium', 'numpy', 'mujoco'} & set(sys.modules)",
+        "import hopping_leg, sys; assert not {'mujoco', 'torch'} & set(sys.modules)",
     ],
 )
-def test_gymnasium_knows_it_imported_or_not_and_the_package_does_not_import_it(words):
+def test_gymnasium_knows_it_by_its_package_or_its_import(words):
     subprocess.run([sys.executable, "-W", "error::UserWarning", "-c", words], check=True)
