@@ -57,10 +57,6 @@ SECONDS = {
 """Lengths of the paper's trials, which have no option."""
 
 ELSEWHERE = {
-    **dict.fromkeys(
-        ("hop policies push", "hop policies pull", "hop policies list --hub"),
-        "a hub: tests/controllers/test_policy_hub.py",
-    ),
     "hop reproduce": "minutes even with --quick: tests/cli/test_reproduce.py",
 }
 """Commands that are not run here, and why; their options must parse all the same."""
@@ -134,7 +130,7 @@ def _trained_policy() -> None:
 
 
 def _bag_and_policy() -> None:
-    """Leave what is not made here: a recording as a bag, and what comes from the hub."""
+    """Leave what is not made here: a recording as a bag, and a policy."""
     from hopping_leg.formats.mcap_writer import to_mcap
     from hopping_leg.identify.excitation import Multisine, make_excitation
     from hopping_leg.identify.play_excitation import play
@@ -144,9 +140,7 @@ def _bag_and_policy() -> None:
     recording.save(Path("bag.parquet"))
     Path("bag.mcap").write_bytes(to_mcap(Trace.load(Path("bag.parquet"))))
     Path("bag.parquet").unlink()
-    for folder in ("mine", "pulled"):
-        Path(f"runs/{folder}").mkdir()
-        shutil.copy(ROOT / "src/hopping_leg/policies/fast.onnx", f"runs/{folder}/policy.onnx")
+    _trained_policy()
 
 
 def _wired_leg_and_killed_run() -> None:

@@ -1,1 +1,1 @@
-"""Traces in the files of other tools: ROS 2 bags, rerun recordings, LeRobot datasets."""
+"""Traces in the files of other tools: ROS 2 bags and MCAP."""
