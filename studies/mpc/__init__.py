@@ -1,8 +1,7 @@
-"""What hops shall the teacher show, how high does it reach, and what can a leg know of itself?"""
+"""What hops shall the teacher show, and how high does it reach?"""
 
 RESULTS = (
     "python -m studies.mpc reach --json studies/mpc/results/reach.json",
-    "python -m studies.mpc observer --json studies/mpc/results/observer.json",
     "python -m studies.mpc search --generations 20 --population 10 --json "
     "studies/mpc/results/search.json",
 )
@@ -20,18 +19,6 @@ TABLES = (
         "rms_hip_torque_nm=hip RMS, N m",
         "mean_power_w=power, W",
         "peak_knee_speed_rad_s=knee at most, rad/s",
-    ),
-    (
-        "table",
-        "observer.json",
-        "rows",
-        "robot",
-        "controller",
-        "command_m=command, m",
-        "median_error_m*1000=error, mm",
-        "std_m*1000=std, mm",
-        "hops",
-        "skipped_hops=skipped",
     ),
     ("table", "search.json", "shape", "name=number", "shipped", "found"),
 )

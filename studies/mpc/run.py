@@ -20,12 +20,6 @@ from hopping_leg.cma_strategy import seeded_strategy
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.mpc import HopShape, TrueStateMpc
 from hopping_leg.controllers.protocol import Controller
-from hopping_leg.controllers.registry import (
-    ENERGY_SHAPING,
-    MPC,
-    MPC_TRUE_STATE,
-    load_controller,
-)
 from hopping_leg.evaluate.motor_load import motor_load
 from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.hop_detection import measure_hops
@@ -188,35 +182,6 @@ class Reach:
 
 
 @dataclass(frozen=True)
-class Observer:
-    """What the true state is worth: MPC with it and on a particle filter, beside energy shaping."""
-
-    robots: tuple[str, ...] = ROBOTS[:2]
-    """Shipped names or .toml files."""
-    seed: int = 1000
-    """Of noise and delay."""
-    json: Path | None = None
-    """Write every number to this file."""
-
-    def measure(self) -> dict[str, Any]:
-        """Run it, print a table, return every number."""
-        heights = np.arange(0.22, 0.4001, 0.03).round(3).tolist()
-        rows = []
-        table = Table("robot", "controller", "command, m", "error, mm", "std, mm")
-        for name in self.robots:
-            robot = load_robot(name)
-            for controller in (MPC_TRUE_STATE, MPC, ENERGY_SHAPING):
-                loaded = load_controller(controller, robot, simulated=True)
-                for hops in measure(loaded, robot, heights, self.seed):
-                    rows.append({"robot": name, "controller": controller, **asdict(hops)})
-                    numbers = (1e3 * hops.median_error_m, 1e3 * hops.std_m)
-                    cells = [f"{value:.1f}" for value in numbers]
-                    table.add_row(name, controller, f"{hops.command_m:.2f}", *cells)
-        plain_console().print(table)
-        return {"rows": rows, "seed": self.seed}
-
-
-@dataclass(frozen=True)
 class Search:
     """Search the shape of hops of least scatter with CMA-ES, beginning at the shipped one."""
 
@@ -273,4 +238,4 @@ class Search:
         return {"shape": shape, "robots": self.robots, "costs_mm": costs, "seed": self.seed}
 
 
-Options = Reach | Observer | Search
+Options = Reach | Search

@@ -14,16 +14,13 @@ Examples:
   python -m studies.sim_to_real prediction --json prediction.json
   python -m studies.sim_to_real transfer --twins 10 --seeds 0 1 2 --jobs 8
   python -m studies.sim_to_real transfer --twins my_twin.toml other_twin.toml --jobs 2
-  python -m studies.sim_to_real zero-shot --controllers universal energy-shaping mpc --twins 100
+  python -m studies.sim_to_real zero-shot --controllers universal energy-shaping --twins 100
 """
 
 RESULTS = (
     "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping --twins 100 "
     "--seed 6000 --jobs 2 --out runs/zero-shot-twins "
     "--json studies/sim_to_real/results/zero_shot_twins.json",
-    "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping mpc --twins 20 "
-    "--seed 6000 --commands 0.22,0.28,0.34,0.40 --jobs 2 --out runs/zero-shot-mpc "
-    "--json studies/sim_to_real/results/zero_shot_mpc.json",
     "python -m studies.time_to_accuracy --recipes universal --seeds 0 1 2 "
     "--out runs/time_to_accuracy && "
     "python -m studies.sim_to_real zero-shot --controllers universal "
@@ -65,7 +62,6 @@ ZERO_SHOT = (
 
 TABLES = (
     ("table", "zero_shot_twins.json", "summary", *ZERO_SHOT),
-    ("table", "zero_shot_mpc.json", "summary", *ZERO_SHOT),
     ("table", "zero_shot_seeds.json", "summary", *ZERO_SHOT),
     ("table", "zero_shot_legs.json", "summary", *ZERO_SHOT),
     *(

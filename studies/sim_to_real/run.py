@@ -327,7 +327,7 @@ class Experiment:
     Valid: identified, cad, table-1, rail-only, fixed-base-only, two-pass, one-pass, truth; not to
     foretell, as each leg in training differs, identified-posterior, randomised,
     identified-surprises, cad-surprises; and, not trained, energy-shaping, energy-shaping-tuned,
-    universal, universal-identified, mpc, mpc-identified.
+    universal, universal-identified.
     Default: identified, cad, table-1, randomised and energy-shaping; or all that can foretell."""
     seeds: tuple[int, ...] = (0,)
     """Seeds of the trainings, one of each method and twin each."""

@@ -120,10 +120,6 @@ METHODS = {
             Fit(),
             untrained="universal",
         ),
-        Method("mpc", "`mpc`, told the CAD's robot", untrained="mpc"),
-        Method(
-            "mpc-identified", "`mpc`, told what both recordings identify", Fit(), untrained="mpc"
-        ),
     )
 }
 """Every method by name."""

@@ -210,7 +210,7 @@ def _place(row: dict[str, Any]) -> tuple[str, float]:
 class ZeroShot:
     """Let controllers hop on legs that they have never met: drawn twins, or a folder's robots."""
 
-    controllers: tuple[str, ...] = ("universal", ENERGY_SHAPING, "mpc")
+    controllers: tuple[str, ...] = ("universal", ENERGY_SHAPING)
     """Names or files of controllers; each is told the robot that a twin's file extends."""
     twins: int = 100
     """How many twins to draw."""

@@ -6,8 +6,6 @@ RESULTS = (
     "python -m studies.speed inference --json studies/speed/results/inference.json",
     "python -m studies.speed view --json studies/speed/results/view.json",
     "python -m studies.speed deploy --json studies/speed/results/deploy.json",
-    "python -m studies.speed deploy --controller mpc --minutes 3 --seconds 4 --json "
-    "studies/speed/results/deploy_mpc.json",
 )
 
 TABLES = (

@@ -1,4 +1,4 @@
-"""Controllers by name: energy shaping, mpc, policies, a user's policy, gain file or class."""
+"""Controllers by name: energy shaping, teacher, policies, a user's policy, gain file or class."""
 
 import shlex
 from collections.abc import Callable, Sequence
@@ -22,9 +22,6 @@ ENERGY_SHAPING_FLYING = "energy-shaping-flying"
 ENERGY_SHAPING_LITERAL = "energy-shaping-literal"
 """The paper's law and gains as printed."""
 
-MPC = "mpc"
-"""Plans every push from what a particle filter makes of the joints."""
-
 MPC_TRUE_STATE = "mpc-true-state"
 """Plans every push in the true state: in simulation alone."""
 
@@ -37,7 +34,6 @@ _FACTORIES: dict[str, Callable[..., protocol.Controller]] = {
         energy_shaping.tuned_energy_shaping, gains=ENERGY_SHAPING_FLYING
     ),
     ENERGY_SHAPING_LITERAL: energy_shaping.paper_energy_shaping,
-    MPC: mpc.Mpc,
     MPC_TRUE_STATE: mpc.TrueStateMpc,
 }
 _SHIPPED = resources.files("hopping_leg") / "policies"

@@ -1,8 +1,6 @@
 """MPC: simulate the rest of the hop, choose the push-off that reaches the apex."""
 
-from hopping_leg.controllers.mpc.controller import Mpc
-from hopping_leg.controllers.mpc.particle_filter import FilterOptions, ParticleFilter
 from hopping_leg.controllers.mpc.planner import HopShape, Planning
 from hopping_leg.controllers.mpc.true_state import TrueStateMpc
 
-__all__ = ["FilterOptions", "HopShape", "Mpc", "ParticleFilter", "Planning", "TrueStateMpc"]
+__all__ = ["HopShape", "Planning", "TrueStateMpc"]
