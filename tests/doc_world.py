@@ -29,7 +29,6 @@ SHORTER = {
         "--timestep": "0.001",
     },
     "hop robustness": {"--seeds": "1", "--commands": "0.3", "--axes": "payload"},
-    "hop skills": {"--seeds": "1", "--commands": "0.3", "--floor": "soft"},
     "hop excite fixed-base": {
         "--amplitudes": "0.05", "--periods": "0.5", "--swings": "10", "--duration": "10",
     },

@@ -1,4 +1,4 @@
-"""Results of `hop evaluate`, `hop robustness` and `hop skills` for the shipped controllers."""
+"""Results of `hop evaluate` and `hop robustness` for the shipped controllers."""
 
 _EVERY_CM = ",".join(f"{0.22 + 0.01 * step:.2f}" for step in range(21))
 """Heights from 0.22 to 0.42 m."""
@@ -61,9 +61,6 @@ RESULTS = (
     "cp runs/results/robustness/robustness.svg studies/evaluation/figures",
     f"hop robustness paper {_BASELINES} --seeds 3 --out runs/results/paper_robustness --json "
     "studies/evaluation/results/paper_robustness.json",
-    "hop skills fast precise universal energy-shaping --floor soft --json "
-    "studies/evaluation/results/skills.json",
-    "hop skills paper energy-shaping --json studies/evaluation/results/paper_skills.json",
 )  # fmt: skip
 
 _ACCURACY = (

@@ -14,7 +14,6 @@ from hopping_leg.evaluate.entries import load_entries
 from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
 from hopping_leg.evaluate.runner import _note_stopped
-from hopping_leg.evaluate.skills.suite import run_skills
 from hopping_leg.evaluate.trials import (
     COMMANDS,
     Trial,
@@ -106,7 +105,7 @@ def robustness(entries, setup, **options):
     run_suite(entries, make_suite(setup, axes=["links"], **options), ResultCache(Path("unused")))
 
 
-@pytest.mark.parametrize("suite", [evaluate, robustness, run_skills])
+@pytest.mark.parametrize("suite", [evaluate, robustness])
 @pytest.mark.parametrize(
     ("names", "options", "sentence"),
     [

@@ -142,35 +142,6 @@ _SHORT = (
     _percent("out", "outside_limits_fraction"),
 )
 
-_COUNTED = (
-    _CONTROLLER,
-    _FLOOR,
-    _COMMAND,
-    column("asked", "asked"),
-    _percent("exact", "exact"),
-    _percent("at rest", "at_rest"),
-    column("error / mm", "median_error_m", "+z.1f", 1e3),
-    column("landing / weights", "landing_force", ".1f"),
-)
-
-_CLIMBS = (
-    _CONTROLLER,
-    _FLOOR,
-    _COMMAND,
-    column("first hop / mm", "worst_first_error_m", "+z.1f", 1e3),
-    column("later / mm", "worst_error_m", "+z.1f", 1e3),
-    _SKIPPED,
-)
-
-_LANDINGS = (
-    column("landing by", "controller"),
-    _FLOOR,
-    column("force / weights", "peak_force", ".2f"),
-    column("hip / N m", "peak_hip_torque_nm", ".1f"),
-    column("knee / N m", "peak_knee_torque_nm", ".1f"),
-    column("rebound / mm", "rebound_m", ".2f", 1e3),
-)
-
 
 def neighbour_table(comparisons: Sequence[Comparison]) -> Markup:
     """Return the tests between neighbouring commands."""
@@ -341,17 +312,6 @@ def _back(row: dict[str, Any]) -> str:
     hops, later = row["back_after_hops"], row["later_abs_error_m"]
     size = "-" if later is None else f"{1e3 * later:.0f}"
     return f"{'-' if hops is None else hops} [{size}]"
-
-
-def print_skills(console: Console, result: dict[str, Any]) -> None:
-    """Print the tables of skills."""
-    drop = 1e3 * result["conditions"]["drop_m"]
-    for columns, name, title in (
-        (_COUNTED, "counted", "Hop so many times and stop"),
-        (_CLIMBS, "climbs", "Stairs: worst step, apex minus command above the ground of it"),
-        (_LANDINGS, "landings", f"Dropped by {drop:.0f} mm"),
-    ):
-        print_table(_text_table(columns, result[name], title), console)
 
 
 def _text_table(
