@@ -59,7 +59,6 @@ def _positive(value: float | None) -> bool:
 
 
 _CONTROLLER = column("controller", "controller")
-_FLOOR = column("floor", "floor")
 _COMMAND = column("command / m", "command_m", ".2f")
 _ERROR = column("median error / mm", "median_error_m", "+z.1f", 1e3)
 _INTERVAL = Column("95 % interval / mm", _interval)
