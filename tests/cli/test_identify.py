@@ -12,7 +12,6 @@ import polars as pl
 import pytest
 
 from hopping_leg.cli import FAILED, INTERRUPTED, identify, main
-from hopping_leg.cli.identify import FitProgress
 from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.play_excitation import play
 from hopping_leg.robot import load_robot
@@ -191,17 +190,3 @@ def test_warnings_of_recordings_are_shown(tmp_path, capsys):
     path = write_run(tmp_path, table, sidecar)
     assert call(tmp_path, path, *FEW, "--generations", "1") == 0
     assert "uninitialised memory" in capsys.readouterr().out
-
-
-def test_without_a_terminal_there_are_two_lines_a_minute(monkeypatch, capsys):
-    clock = [0.0]
-    monkeypatch.setattr(time, "monotonic", lambda: clock[0])
-    with FitProgress() as progress:
-        for second in range(0, 181, 10):
-            clock[0] = float(second)
-            progress.update("cma", max(second, 1) / 400, 1234.5)
-    lines = capsys.readouterr().err.strip().splitlines()
-    assert [line.split(" · ")[0] for line in lines] == [
-        f"cma {share} %" for share in (2, 10, 18, 25, 32, 40)
-    ]
-    assert lines[-1] == "cma 40 % · cost 1234.5 · about 4:00 left"
