@@ -41,9 +41,6 @@ SHORTER = {
     "hop train --recipe universal": {
         "--steps": "1", "--heights": "0.28 0.32", "--set": "num_envs=64 batch_size=1024",
     },
-    "python -m studies.energy_shaping.tune": {
-        "--generations": "1", "--population": "4", "--seconds": "3",
-    },
     "hop view": {"--no-browser": None, "--port": "0", "--seconds": "0.5"},
 }  # fmt: skip
 """Options that replace or join those of every command with these words; of several entries the one
@@ -56,11 +53,21 @@ SECONDS = {
 """Lengths of the paper's trials, which have no option."""
 
 ELSEWHERE = {
+    **dict.fromkeys(
+        ("hop evaluate runs/my_leg/gains.toml", "hop evaluate runs/heron/tuned/gains.toml"),
+        "minutes of search before: studies/tests/test_gain_tuning.py",
+    ),
     "hop reproduce": "minutes even with --quick: tests/cli/test_reproduce.py",
 }
 """Commands that are not run here, and why; their options must parse all the same."""
 
-INTERRUPTED = {"hop train --recipe paper --seed 0 --out runs/mine": cli.INTERRUPTED}
+INTERRUPTED = dict.fromkeys(
+    (
+        "hop train --recipe paper --seed 0 --out runs/mine",
+        "hop train --recipe fast --out runs/continued",
+    ),
+    cli.INTERRUPTED,
+)
 """Commands that are interrupted here, as their page goes on with them, and their exit code."""
 
 REFUSED = {"hop doctor --transport /dev/fdcanusb --robot my_leg.toml --home 0.0 0.0": cli.FAILED}
