@@ -1,0 +1,49 @@
+"""The house stays small: ceilings of files and lines, a little above what is there."""
+
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+CEILINGS = {
+    "src/hopping_leg/*.py": (14, 1450),
+    "src/hopping_leg/cli/**/*.py": (22, 3210),
+    "src/hopping_leg/controllers/**/*.py": (21, 3180),
+    "src/hopping_leg/deploy/**/*.py": (20, 3430),
+    "src/hopping_leg/emulator/**/*.py": (17, 2590),
+    "src/hopping_leg/envs/**/*.py": (10, 1800),
+    "src/hopping_leg/evaluate/**/*.py": (23, 3980),
+    "src/hopping_leg/formats/**/*.py": (4, 330),
+    "src/hopping_leg/identify/**/*.py": (30, 5980),
+    "src/hopping_leg/rl/**/*.py": (26, 3460),
+    "src/hopping_leg/robot/**/*.py": (20, 3120),
+    "src/hopping_leg/sim/**/*.py": (16, 3050),
+    "src/hopping_leg/sim_to_real/**/*.py": (6, 950),
+    "src/hopping_leg/viewer/**/*.py": (11, 1680),
+    "src/**/*.py": (240, 38150),
+    "tests/**/*.py": (162, 19300),
+    "studies/**/*.py": (97, 11580),
+    "docs/**/*.md": (39, 3570),
+    "docs/live/*.js": (13, 1510),
+}
+"""Files and lines at most. Who raises one says what users gain by it."""
+
+
+def size(pattern):
+    """Return the number of files that match, and of their lines together."""
+    files = sorted(ROOT.glob(pattern))
+    return len(files), sum(len(file.read_text(encoding="utf-8").splitlines()) for file in files)
+
+
+@pytest.mark.parametrize("pattern", CEILINGS)
+def test_no_part_outgrows_its_ceiling(pattern):
+    files, lines = size(pattern)
+    most_files, most_lines = CEILINGS[pattern]
+    assert 0 < files <= most_files, f"{pattern}: {files} files, at most {most_files}"
+    assert lines <= most_lines, f"{pattern}: {lines} lines, at most {most_lines}"
+
+
+def test_every_room_has_a_ceiling():
+    rooms = (d for d in (ROOT / "src/hopping_leg").iterdir() if any(d.rglob("*.py")))
+    assert {f"src/hopping_leg/{room.name}/**/*.py" for room in rooms} <= CEILINGS.keys()
