@@ -41,14 +41,9 @@ def rig_model(robot, rig, timestep=FINE):
     return compile_spec(spec, robot.name)
 
 
-def record(
-    robot, targets, rig="fixed-base", rate=200.0, onboard="zoh", name="twin", rubs=None, fine=FINE
-):
-    """Track targets with a PD at the rows' rate on a robot in MuJoCo.
-
-    ``rubs`` is friction beside the robot's by angles (2,), N m; ``fine`` the physics step, s.
-    """
-    model = rig_model(robot, rig, fine)
+def record(robot, targets, rig="fixed-base", rate=200.0, onboard="zoh", name="twin"):
+    """Track targets with a PD at the rows' rate on a robot in MuJoCo."""
+    model = rig_model(robot, rig)
     data = mujoco.MjData(model)
     limit = MotorLimit(robot)
     kp, kd = (np.array(GAINS[k]) for k in ("stiffness", "damping"))
@@ -61,10 +56,8 @@ def record(
         height, measured = data.qpos[0], limit.clip(asked, qd)
         asked = kp * (target - q) - kd * qd
         rows.append((q, qd, measured, asked, target, height))
-        for _ in range(round(1 / rate / fine)):
+        for _ in range(round(1 / rate / FINE)):
             data.ctrl[:] = limit.clip(asked, data.qvel[-2:])
-            if rubs is not None:
-                data.qfrc_applied[-2:] = -rubs(data.qpos[-2:]) * np.tanh(data.qvel[-2:] / 0.02)
             mujoco.mj_step(model, data)
     q, qd, measured, torque, target, height = (np.array(c) for c in zip(*rows, strict=True))
     columns = {"time_s": np.arange(len(q)) / rate}

@@ -41,7 +41,6 @@ VERBS = {
     "export": "write a leg as URDF, traces for Foxglove, rerun, ROS 2",
     "record": "play an excitation on a leg and record it",
     "identify": "fit a leg to recordings and write its robot file",
-    "diagnose": "say what recordings tell is wrong with a leg",
     "deploy": "run a controller on the real leg, or on emulated drives",
     "view": "watch the leg in the browser: live, a trace, or the real one",
     "doctor": "say what is missing here; check, configure and home a leg's drives",

@@ -40,11 +40,11 @@ class Balance:
     """The balance of a recording whose torques are commanded, solved for its numbers.
 
     ``values`` and their deviations ``errors`` are a, b, c, d, G cos z and -G sin z of hip and knee,
-    and friction; ``offsets`` and their deviations are torques that are always there, if ``biased``;
-    ``unexplained`` is the torques' share that is left. Signs are factors of each joint's angles and
-    torques; ``upright`` takes both zeros for right, ``lever``, s2, b / G2 for known. ``further``
-    are torques at joints by number, known but for their factors, a value a row; of these factors
-    ``found`` has the values and their covariance. ``design`` times all values is ``target``.
+    and friction, then torques that are always there, if ``biased``, and factors of ``further``:
+    torques at joints by number, known but for a factor, a value a row. ``unexplained`` is the
+    torques' share that is left. Signs are factors of each joint's angles and torques; ``upright``
+    takes both zeros for right, ``lever``, s2, b / G2 for known. ``design`` times all values is
+    ``target``.
     """
 
     def __init__(
@@ -116,8 +116,6 @@ class Balance:
         covariance = np.linalg.pinv(scaled.T @ scaled, hermitian=True)
         deviations = np.sqrt(np.maximum(np.diag(covariance), 0))
         self.errors = np.where(scaled.any(axis=0), deviations, np.inf)
-        self.offsets = self.values[16:18], self.errors[16:18]
-        self.found = self.values[18:], covariance[18:, 18:]
         self.design, self.target = design, target
 
 
