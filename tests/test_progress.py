@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from hopping_leg.progress import LiveProgress, ShareProgress, minutes, said_if_slow
 from hopping_leg.rl.learner import RecentHops
 from hopping_leg.rl.train import TrainingProgress
-from hopping_leg.sim_to_real.jobs import Board
 
 
 @pytest.mark.parametrize("option", [{"quiet": True}, {"lines": False}])
@@ -33,18 +32,6 @@ def test_a_training_tells_only_what_it_knows(monkeypatch):
         "fast seed 0 50 % · 2 hops · apex error 12 mm · 20 steps/s · best snapshot 9 mm"
         " · about 2:00 left"
     )
-
-
-def test_a_study_counts_earlier_jobs_but_not_their_time(capsys, monkeypatch):
-    now = 0.0
-    monkeypatch.setattr(time, "monotonic", lambda: now)
-    board = Board(400.0)
-    board.finish("old", 200.0, new=False)
-    now = 250.0  # twice as long as the weight of what is new says
-    board.finish("new", 120.0)
-    assert capsys.readouterr().err == "transfer 80 % · done: new · about 2:40 left\n"
-    board.show(["last"])
-    assert board.text == "transfer 80 % · last · about 2:40 left"
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(0.4, "0:00"), (59.6, "1:00"), (3601, "60:01")])

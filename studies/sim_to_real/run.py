@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.cli.options import Heights, at_least, say
-from hopping_leg.cli.reproduce import show_overall, show_transfer
+from hopping_leg.cli.options import Heights, at_least, say, show_table
 from hopping_leg.controllers import Controller
 from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller
 from hopping_leg.errors import UsageError
@@ -27,12 +26,19 @@ from hopping_leg.robot import (
     Robot,
     load_robot,
 )
-from hopping_leg.sim_to_real.jobs import work_through
-from hopping_leg.sim_to_real.policies import HopTrial
-from hopping_leg.sim_to_real.tables import Row, median_over_twins, overall, tabulate
-from hopping_leg.sim_to_real.transfer import about
-from hopping_leg.sim_to_real.twins import Twin, simulated
-from studies.sim_to_real.study import DEFAULT, FORETOLD, Method, Study, choose_methods, find_twins
+from studies.sim_to_real.jobs import work_through
+from studies.sim_to_real.policies import HopTrial
+from studies.sim_to_real.study import (
+    DEFAULT,
+    FORETOLD,
+    Method,
+    Study,
+    about,
+    choose_methods,
+    find_twins,
+)
+from studies.sim_to_real.tables import Row, median_over_twins, overall, tabulate
+from studies.sim_to_real.twins import Twin, simulated
 from studies.sim_to_real.zero_shot import ZeroShot
 
 Without = Callable[[ModelMismatch], ModelMismatch]
@@ -399,6 +405,34 @@ class Prediction(Experiment):
         result = predict(self.study(self.methods or FORETOLD), self.jobs)
         show_predictions(result)
         return result
+
+
+def show_transfer(result: dict[str, Any]) -> None:
+    """Print the tables of sim-to-real trials."""
+    rows = []
+    for row in result["rows"]:
+        low, high = (millimetres(row[f"median_abs_error_{end}_m"]) for end in ("low", "high"))
+        error, skipped = millimetres(row["median_abs_error_m"]), row["skipped_hops"]
+        hops = f"{skipped}/{row['hops'] + skipped}"
+        command, signed = millimetres(row["command_m"]), millimetres(row["median_error_m"])
+        rows.append((row["method"], command, error, f"{low}-{high}", signed, hops))
+    show_table(("trained on", "command, mm", "|error|, mm", "95 %", "error, mm", "skipped"), rows)
+    show_overall(result)
+    say(*(f"Note: {note}" for note in result["notes"]))
+
+
+def show_overall(result: dict[str, Any]) -> None:
+    """Print the methods' errors over all commands."""
+    for row in result["methods"]:
+        say(
+            f"{row['method']}: {millimetres(row['median_abs_error_m'])} mm over all commands,"
+            f" {row['ordered']} of {row['policies']} policies in order"
+        )
+    for row in result["comparison"]:
+        say(
+            f"{row['method']} errs {row['ratio']:.1f} times as much as {row['over']}"
+            f" ({row['ratio_low']:.1f} to {row['ratio_high']:.1f})"
+        )
 
 
 def show_predictions(result: dict[str, Any]) -> None:

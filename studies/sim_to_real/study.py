@@ -4,12 +4,13 @@ import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 from hopping_leg import io
 from hopping_leg.controllers.energy_shaping.gains import load_gains
 from hopping_leg.controllers.registry import ENERGY_SHAPING
 from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.evaluate import runner
 from hopping_leg.identify import cost, optimizers, plan
 from hopping_leg.identify.pipeline import IdentifyOptions
 from hopping_leg.identify.recording import Recording
@@ -18,19 +19,20 @@ from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes import Randomise, change, get_recipe, randomise
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim.randomization import RANDOMIZABLE, Range
-from hopping_leg.sim_to_real.jobs import StoredJob
-from hopping_leg.sim_to_real.policies import COMMANDS, HopTrial, TrainPolicy
-from hopping_leg.sim_to_real.twins import (
+from studies.energy_shaping.tuning import Search as GainSearch
+from studies.energy_shaping.tuning import tune
+from studies.sim_to_real.jobs import StoredJob
+from studies.sim_to_real.policies import COMMANDS, FIRST_SEED, HopTrial, TrainPolicy
+from studies.sim_to_real.twins import (
     RIGS,
     SHORTEST,
     IdentifyTwin,
     RecordTwin,
     Twin,
+    disturbance_of,
     drawn_twin,
     given_twin,
 )
-from studies.energy_shaping.tuning import Search as GainSearch
-from studies.energy_shaping.tuning import tune
 
 Search = Literal["least-squares", "two-pass", "one-pass"]
 
@@ -149,6 +151,25 @@ def choose_methods(names: Sequence[str]) -> tuple[Method, ...]:
     return tuple(METHODS[name] for name in names)
 
 
+def about(twins: tuple[Twin, ...], seconds: float, repeats: int) -> dict[str, Any]:
+    """Return what results begin with: the twins and how they were met."""
+    return {
+        "twins": [
+            {
+                "name": twin.name,
+                "robot_digest": twin.robot.digest,
+                "believed": twin.believed,
+                "paper_disturbance": disturbance_of(twin.robot).delay_probability > 0,
+            }
+            for twin in twins
+        ],
+        "recording_seconds": seconds,
+        "evaluation_seed": FIRST_SEED,
+        "evaluation_seeds": repeats,
+        "versions": runner.software_versions(),
+    }
+
+
 def find_twins(words: Sequence[str], folder: Path) -> tuple[Twin, ...]:
     """Return twins that were asked for; drawn ones are written to a folder.
 
@@ -233,8 +254,6 @@ class TuneGains(StoredJob):
 
     file: Path
     source: str
-
-    weight: ClassVar[float] = 60.0
 
     @property
     def name(self) -> str:

@@ -4,7 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from rich.table import Table
@@ -25,9 +25,9 @@ from hopping_leg.evaluate import entries, runner, statistics, trials
 from hopping_leg.evaluate.tables import millimetres
 from hopping_leg.hop_detection import find_hops, measure_hops
 from hopping_leg.robot import JOINTS, Robot, load_robot, parent_robot
-from hopping_leg.sim_to_real.jobs import StoredJob, work_through
-from hopping_leg.sim_to_real.twins import disturbance_of, drawn_twin
 from hopping_leg.terminal import plain_console
+from studies.sim_to_real.jobs import StoredJob, work_through
+from studies.sim_to_real.twins import disturbance_of, drawn_twin
 
 COMMANDS = (0.22, 0.24, 0.26, 0.28, 0.30, 0.32, 0.34, 0.36, 0.38, 0.40)
 """Apex heights of a leg of the paper's size, m; others are asked for as many times as much."""
@@ -113,8 +113,6 @@ class ZeroShotTrial(StoredJob):
     controller: str
     commands: tuple[float, ...]
     seconds: float
-
-    weight: ClassVar[float] = 4.0
 
     @property
     def name(self) -> str:

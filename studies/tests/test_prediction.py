@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from hopping_leg.sim_to_real import policies
-from hopping_leg.sim_to_real.twins import simulated
+from studies.sim_to_real import policies
+from studies.sim_to_real.twins import simulated
 
 pytest.importorskip("torch")
 from studies.sim_to_real.run import foretold, met, prediction_rows

@@ -5,13 +5,13 @@ import json
 from pathlib import Path
 
 import pytest
-from tests.sim_to_real.test_tables import trials
 
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.robot import load_robot, load_tree, robot_text
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES
-from hopping_leg.sim_to_real.twins import simulated
 from studies.energy_shaping.tuning import Search as GainSearch
+from studies.sim_to_real.twins import simulated
+from studies.tests.test_transfer_tables import trials
 
 pytest.importorskip("torch")
 from studies import shared

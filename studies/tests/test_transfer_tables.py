@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.evaluate import motor_load
-from hopping_leg.sim_to_real.tables import compare, overall, tabulate
+from studies.sim_to_real.tables import compare, overall, tabulate
 
 LOAD = dataclasses.asdict(motor_load.unknown())
 

@@ -7,7 +7,7 @@ would come on top. A twin without [reality] is met with the paper's disturbance.
 import json
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from hopping_leg import io, trace
 from hopping_leg.errors import UsageError
@@ -23,7 +23,7 @@ from hopping_leg.identify.search import SearchOptions
 from hopping_leg.robot import NO_MISMATCH, Latency, Robot, load_robot, parent_robot, shipped_robots
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 from hopping_leg.sim.randomization import draw_twin
-from hopping_leg.sim_to_real.jobs import StoredJob
+from studies.sim_to_real.jobs import StoredJob
 
 RIGS: tuple[Rig, ...] = ("fixed-base", "rail")
 
@@ -108,8 +108,6 @@ class RecordTwin(StoredJob):
     rig: Rig
     seconds: float = SHORTEST
 
-    weight: ClassVar[float] = 5.0
-
     @property
     def name(self) -> str:
         """What is done."""
@@ -160,9 +158,6 @@ class IdentifyTwin(StoredJob):
     recordings: tuple[Path, ...]
     method: str = "identified"
     effort: LeastSquaresOptions = USUAL_FIT
-
-    weight: ClassVar[float] = 35.0
-    on_all_cores: ClassVar[bool] = True
 
     @property
     def name(self) -> str:

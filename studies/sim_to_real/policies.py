@@ -3,7 +3,7 @@
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from hopping_leg import io
 from hopping_leg.arrays import Array
@@ -14,8 +14,8 @@ from hopping_leg.evaluate import entries, runner
 from hopping_leg.evaluate.motor_load import MotorLoad
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim import Measurement
-from hopping_leg.sim_to_real.jobs import Job, StoredJob
-from hopping_leg.sim_to_real.twins import Twin, disturbance_of, simulated
+from studies.sim_to_real.jobs import Job, StoredJob
+from studies.sim_to_real.twins import Twin, disturbance_of, simulated
 
 if TYPE_CHECKING:
     from hopping_leg.rl.recipe import Recipe
@@ -43,11 +43,6 @@ class TrainPolicy(Job):
         return self.recipe
 
     @property
-    def weight(self) -> float:
-        """Rough time, s."""
-        return 10.0 + self.recipe.schedule.steps / 17_000
-
-    @property
     def name(self) -> str:
         """What is done."""
         return f"train {self.folder.name}"
@@ -71,13 +66,6 @@ class TrainPolicy(Job):
 
         robot = simulated(self.source)
         train(self.trained, robot, self.seed, self.folder, resume=True, threads=1, quiet=quiet)
-
-    def progress(self) -> tuple[float, str]:
-        """Return the share done and what to show while it runs."""
-        snapshots = sorted((self.folder / "snapshots").glob("*.onnx"))
-        steps = int(snapshots[-1].stem) if snapshots else 0
-        share = min(steps / self.recipe.schedule.steps, 1.0)
-        return share, f"{steps / 1e6:.1f}M steps" if steps else "begun"
 
     def row(self) -> dict[str, Any]:
         """Return how the policy hops in the simulation that it was trained in.
@@ -132,8 +120,6 @@ class HopTrial(StoredJob):
     repeats: int = 3
     untrained: str = ENERGY_SHAPING
     told: str = ""
-
-    weight: ClassVar[float] = 8.0
 
     @property
     def name(self) -> str:

@@ -4,6 +4,7 @@ import dataclasses
 
 import polars as pl
 import pytest
+from tests.identify.twin import record, swing
 
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.parameters import LegHypothesis
@@ -11,8 +12,9 @@ from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import NO_NOISE
-from hopping_leg.sim_to_real import twins
-from hopping_leg.sim_to_real.twins import (
+from hopping_leg.trace import Trace
+from studies.sim_to_real import twins
+from studies.sim_to_real.twins import (
     IdentifyTwin,
     RecordTwin,
     disturbance_of,
@@ -20,8 +22,6 @@ from hopping_leg.sim_to_real.twins import (
     given_twin,
     simulated,
 )
-from hopping_leg.trace import Trace
-from tests.identify.twin import record, swing
 
 
 @pytest.fixture

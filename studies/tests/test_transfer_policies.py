@@ -4,25 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from tests.controllers.test_rollout import Constant
 
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import Measurement
-from hopping_leg.sim_to_real.policies import TrainPolicy, WithinRange, hop
-from tests.controllers.test_rollout import Constant
-
-
-def test_a_training_that_goes_beyond_its_steps_is_done_once(tmp_path):
-    pytest.importorskip("torch")
-    from hopping_leg.rl.recipes.fast import FAST
-
-    train = TrainPolicy(tmp_path, "legv2", FAST.replace(steps=1))
-    assert train.progress() == (0.0, "begun")
-    snapshots = tmp_path / "snapshots"
-    snapshots.mkdir()
-    (snapshots / "000000032768.onnx").touch()
-    assert train.progress()[0] == 1.0
+from studies.sim_to_real.policies import WithinRange, hop
 
 
 def test_a_leg_that_never_hops_errs_by_the_distance_from_standing():

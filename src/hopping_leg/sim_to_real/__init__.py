@@ -1,1 +1,0 @@
-"""Does what was trained in simulation hop on the real leg? The paper's claim, tried on twins."""
