@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from mkdocs.exceptions import PluginError
+from studies.evaluation.accuracy import LEAST_FLIGHT, LOWER, accuracies
 
 from hopping_leg import figure_style
 from hopping_leg.cli.demo import BEST
 from hopping_leg.controllers.registry import ENERGY_SHAPING, MPC_TRUE_STATE
-from hopping_leg.evaluate.acceptance import HIGHEST, LEAST_FLIGHT, LOWER, accuracies
 
 STUDIES = Path(__file__).parent.parent / "studies"
 
@@ -285,62 +285,16 @@ def bullets(file: str, path: str) -> str:
     return "\n".join(f"- {sentence}" for sentence in pick(read(file), path))
 
 
-def recoveries(file: str) -> str:
-    """Return how controllers recover in a robustness result: a row per change, the worst command.
-
-    The last rows count changes and commands after which they are back.
-    """
-    content = read(file)
-    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    for row in content["recovery"]:
-        groups.setdefault((row["change"], row["controller"]), []).append(row)
-    controllers = list(dict.fromkeys(controller for _, controller in groups))
-    rows = [
-        [change, *(_recovered(groups[change, name]) for name in controllers)]
-        for change in dict.fromkeys(change for change, _ in groups)
-    ]
-    for title, entry in (
-        ("back, of all changes and commands", "back_after_hops"),
-        ("in the median of the hops' errors", "centred_after_hops"),
-    ):
-        rows.append([title, *(_backs(content, entry, name) for name in controllers)])
-    return grid(["change", *controllers], rows) + origin(file)
-
-
-def _recovered(rows: list[dict[str, Any]]) -> str:
-    first = _worst([error for row in rows for error in row["hop_abs_errors_m"]], 1000)
-    later = _worst([row["later_abs_error_m"] for row in rows], 1000)
-    return f"{_worst([row['back_after_hops'] for row in rows])} [{first}, {later}]"
-
-
-def _backs(content: dict[str, Any], entry: str, controller: str) -> str:
-    hops = [row[entry] for row in content["recovery"] if row["controller"] == controller]
-    return f"{sum(one is not None for one in hops)} of {len(hops)}"
-
-
-def _worst(values: list[float | None], factor: float = 1) -> str:
-    """Return the largest; what does not exist is worse than any number."""
-    known = [value for value in values if value is not None]
-    return number(round(factor * max(known))) if len(known) == len(values) else number(None)
-
-
 def precision(file: str, high: float = 1.0) -> str:
-    """Return how near hops come to commands of an evaluation: a row per controller, in mm.
-
-    Args:
-        file: Name of the result.
-        high: The highest command that counts, m; up to ``HIGHEST`` the table also says whether
-            all is as asked.
-    """
-    judged, rows = high <= HIGHEST, []
+    """Return how near hops come to commands up to the highest, m: a row per controller, in mm."""
+    rows = []
     for name, one in accuracies(read(file)["summary"], high).items():
         values = astuple(one)
         cells = [*(1e3 * v for v in values[:5]), *values[5:8], *(100 * v for v in values[8:])]
-        rows.append([name, *map(number, cells), *([number(one.as_asked)] if judged else [])])
+        rows.append([name, *map(number, cells)])
     titles = [
         "controller", "worst error, mm", "mean", f"worst std up to {LOWER} m", "of all",
         "mean std", "skipped hops", "body contacts", "fewest hops/s", "least flight, %", "mean",
-        *(["as asked"] if judged else []),
     ]  # fmt: skip
     return grid(titles, rows) + origin(file)
 
@@ -394,7 +348,7 @@ def headline() -> str:
 def against(file: str, rival: str) -> str:
     """Return at how many commands controllers beat a rival: a row per controller.
 
-    Of all commands, and of those at which the rival flies for half of the time, as asked of all.
+    Of all commands, and of those at which the rival flies for half of the time.
     One is smaller than the other where their intervals over runs do not overlap.
     """
     rows_of: dict[str, dict[float, dict[str, Any]]] = {}
@@ -510,7 +464,6 @@ MACROS = {
     "pictures": pictures,
     "pivot": pivot,
     "precision": precision,
-    "recoveries": recoveries,
     "safety_case": safety_case,
     "separation": separation,
     "stored": stored,

@@ -1,6 +1,5 @@
 """What stands around the commands of the documentation: what makes them short, and their files."""
 
-import json
 import shutil
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from hopping_leg.robot import load_robot
 from hopping_leg.sim.randomization import draw_twin
 from hopping_leg.trace import Trace
 from tests.doc_pages import ROOT, blocks
-from tests.evaluate.test_comparison import TRAINING
 
 SHORTER = {
     "hop demo": {"--no-browser": None, "--port": "0", "--seconds": "0.5"},
@@ -28,7 +26,6 @@ SHORTER = {
         "--seeds": "1", "--commands": "0.3", "--floor": "soft", "--no-video": None,
         "--timestep": "0.001",
     },
-    "hop robustness": {"--seeds": "1", "--commands": "0.3", "--axes": "payload"},
     "hop excite fixed-base": {
         "--amplitudes": "0.05", "--periods": "0.5", "--swings": "10", "--duration": "10",
     },
@@ -191,6 +188,3 @@ def _stored_runs() -> None:
     for name in ("first", "second"):
         words = ["evaluate", "energy-shaping", *short.split(), f"runs/{name}"]
         assert cli.main(words) == 0
-    for seed in (0, 1):
-        Path(f"runs/fast-seed{seed}").mkdir()
-        Path(f"runs/fast-seed{seed}/result.json").write_text(json.dumps({**TRAINING, "seed": seed}))

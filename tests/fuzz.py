@@ -294,11 +294,21 @@ def _checkpoints(form):
     return Kind(files, name, read, text=form == "state")
 
 
+TRAINING = {
+    "recipe": "fast", "robot": "legv2-paper", "robot_digest": "abc", "seed": 0,
+    "minutes": 5.0, "steps": 200, "selected": {"steps": 200, "score_m": 0.004},
+    "history": [
+        {"steps": 100, "minutes": 2.0, "score_m": 0.02},
+        {"steps": 200, "minutes": 4.0, "score_m": 0.005},
+    ],
+    "command": "hop train --recipe fast",
+}  # fmt: skip
+
+
 def _runs(form):
     from hopping_leg.rl.recipes import get_recipe
     from hopping_leg.rl.run_folder import RunFolder, read_result
     from hopping_leg.robot import load_robot
-    from tests.evaluate.test_comparison import TRAINING
 
     recipe, robot = get_recipe("fast"), load_robot("legv2-identified")
 
@@ -327,33 +337,6 @@ def _policies(form):
     return Kind(files, "policy.onnx", Policy.load, text=False)
 
 
-def _results(form):
-    from hopping_leg.evaluate.comparison import set_beside
-    from hopping_leg.evaluate.result_files import read_runs
-    from hopping_leg.evaluate.tables import print_evaluation
-    from hopping_leg.terminal import plain_console
-    from tests.evaluate.test_comparison import TRAINING
-
-    def read(path):
-        runs = read_runs([str(path), str(path.with_name("other.json"))])
-        if runs[0].evaluation is not None:
-            print_evaluation(plain_console(quiet=True), runs[0].evaluation)
-        set_beside(runs)
-
-    if form == "training":
-        return Kind(
-            dict.fromkeys(("a.json", "other.json"), json.dumps(TRAINING).encode()), "a.json", read
-        )
-    stored = Path(__file__).parents[1] / "studies" / "evaluation" / "results" / "evaluation.json"
-    content = json.loads(stored.read_bytes())
-    for name in ("summary", "sequence", "ladder", "distributions", "staircase", "neighbours"):
-        content[name] = content[name][:3]
-    content["secondary"] = None
-    return Kind(
-        dict.fromkeys(("a.json", "other.json"), json.dumps(content).encode()), "a.json", read
-    )
-
-
 KINDS = {
     "robot": _robots,
     "twin": functools.partial(_robots, make=True),
@@ -371,7 +354,6 @@ KINDS = {
     **{f"checkpoint-{f}": functools.partial(_checkpoints, f) for f in ("state", "arrays", "old")},
     **{f"run-{f}": functools.partial(_runs, f) for f in ("config", "result")},
     **{f"policy-{f}": functools.partial(_policies, f) for f in ("raw", "card")},
-    **{f"result-{f}": functools.partial(_results, f) for f in ("evaluation", "training")},
 }
 """What makes each kind."""
 

@@ -8,22 +8,22 @@ ROOT = Path(__file__).parents[1]
 
 CEILINGS = {
     "src/hopping_leg/*.py": (14, 1450),
-    "src/hopping_leg/cli/**/*.py": (21, 3210),
+    "src/hopping_leg/cli/**/*.py": (20, 3150),
     "src/hopping_leg/controllers/**/*.py": (21, 3170),
     "src/hopping_leg/deploy/**/*.py": (20, 3420),
     "src/hopping_leg/emulator/**/*.py": (17, 2580),
     "src/hopping_leg/envs/**/*.py": (10, 1790),
-    "src/hopping_leg/evaluate/**/*.py": (23, 3960),
+    "src/hopping_leg/evaluate/**/*.py": (18, 3180),
     "src/hopping_leg/formats/**/*.py": (4, 330),
     "src/hopping_leg/identify/**/*.py": (29, 5730),
     "src/hopping_leg/rl/**/*.py": (26, 3450),
     "src/hopping_leg/robot/**/*.py": (20, 3110),
     "src/hopping_leg/sim/**/*.py": (16, 3040),
     "src/hopping_leg/viewer/**/*.py": (11, 1670),
-    "src/**/*.py": (232, 36800),
-    "tests/**/*.py": (155, 18750),
-    "studies/**/*.py": (104, 12460),
-    "docs/**/*.md": (39, 3550),
+    "src/**/*.py": (226, 35960),
+    "tests/**/*.py": (155, 18490),
+    "studies/**/*.py": (105, 12530),
+    "docs/**/*.md": (39, 3500),
     "docs/live/*.js": (13, 1510),
 }
 """Files and lines at most. Who raises one says what users gain by it."""

@@ -16,7 +16,7 @@ from rich.table import Table
 from hopping_leg.cli.options import at_least
 from hopping_leg.controllers.policy import Card
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.evaluate.result_files import ResultCache
+from hopping_leg.evaluate.result import ResultCache
 from hopping_leg.evaluate.runner import software_versions
 from hopping_leg.rl.onnx_export import Network, build_policy
 from hopping_leg.rl.policy_evaluation import calibrate

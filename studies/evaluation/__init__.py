@@ -1,4 +1,4 @@
-"""Results of `hop evaluate` and `hop robustness` for the shipped controllers."""
+"""Results of `hop evaluate` for the shipped controllers."""
 
 _EVERY_CM = ",".join(f"{0.22 + 0.01 * step:.2f}" for step in range(21))
 """Heights from 0.22 to 0.42 m."""
@@ -48,19 +48,19 @@ RESULTS = (
         f"fast precise universal {_BASELINES} energy-shaping-literal", "evaluation.json",
         "--seeds 10 --floor soft --traces runs/results/traces",
     ),
-    "hop report figures runs/results/traces/*.parquet --out studies/evaluation/figures",
+    "hop report runs/results/traces/*.parquet --out studies/evaluation/figures",
     _trials(f"paper {_BASELINES} energy-shaping-literal", "paper.json", "--seeds 10"),
     *(_universal(robot) for robot in LEGS),
     _precise("precise", "precise"),
     _precise("precise", "precise_fine_step", "--timestep 3.125e-05"),
     _precise("precise", "precise_no_soft_limits", "--no-soft-limits"),
     *(command for robot in _ELSEWHERE for command in _other(robot)),
-    f"hop robustness fast precise universal {_BASELINES} energy-shaping-literal --seeds 3 "
-    f"--seed {_FRESH} --out runs/results/robustness "
+    f"hop evaluate fast precise universal {_BASELINES} energy-shaping-literal --seeds 3 "
+    f"--seed {_FRESH} --suite robustness --out runs/results/robustness "
     "--json studies/evaluation/results/robustness.json",
     "cp runs/results/robustness/robustness.svg studies/evaluation/figures",
-    f"hop robustness paper {_BASELINES} --seeds 3 --out runs/results/paper_robustness --json "
-    "studies/evaluation/results/paper_robustness.json",
+    f"hop evaluate paper {_BASELINES} --seeds 3 --suite robustness "
+    "--out runs/results/paper_robustness --json studies/evaluation/results/paper_robustness.json",
 )  # fmt: skip
 
 _ACCURACY = (

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from hopping_leg.evaluate import result_files
+from hopping_leg.evaluate.result import ResultCache
 from hopping_leg.identify.result import software_versions
 from hopping_leg.identify.search import Report
 from hopping_leg.io import write_json
@@ -59,7 +59,7 @@ class Study:
 
 
 @dataclass(frozen=True)
-class FitCache(result_files.ResultCache):
+class FitCache(ResultCache):
     """Also keeps the checkpoints of a fit that was killed.
 
     Attributes:

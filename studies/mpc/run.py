@@ -21,7 +21,7 @@ from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.mpc import HopShape, TrueStateMpc
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.evaluate.motor_load import motor_load
-from hopping_leg.evaluate.result_files import ResultCache
+from hopping_leg.evaluate.result import ResultCache
 from hopping_leg.hop_detection import measure_hops
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.terminal import plain_console

@@ -18,7 +18,7 @@ from rich.table import Table
 
 from hopping_leg.colours import controller_colours
 from hopping_leg.controllers.policy import Policy
-from hopping_leg.evaluate.result_files import ResultCache
+from hopping_leg.evaluate.result import ResultCache
 from hopping_leg.evaluate.runner import software_versions
 from hopping_leg.figure_style import panels, plain_log, styled, to_svg
 from hopping_leg.io import write_atomically

@@ -43,7 +43,7 @@ def test_deploy_checks_runs_and_leaves_a_trace(emulate, tmp_path, capsys):
     assert trace.header["drives"]["knee"]["homed"] == "yes"
     assert set(np.unique(trace.column("command_m"))) == {0.25, 0.3}
     assert [drive.machine.mode for drive in lockstep.robot.drives] == [0, 0]
-    assert main(["report", "figures", str(file), "--out", str(tmp_path / "figures")]) == 0
+    assert main(["report", str(file), "--out", str(tmp_path / "figures")]) == 0
     assert list((tmp_path / "figures").glob("*.svg"))
 
 

@@ -1,5 +1,4 @@
 import json
-import re
 
 import pytest
 
@@ -9,7 +8,6 @@ from hopping_leg.controllers.registry import load_policy
 from hopping_leg.evaluate.runner import setup_conditions
 from hopping_leg.robot import DEFAULT_ROBOT
 from hopping_leg.trace import Trace
-from tests.evaluate.test_comparison import TRAINING
 
 
 def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys, refused):
@@ -28,12 +26,8 @@ def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys,
     ]
     assert Trace.load(traces[0]).header["controller"] == "spring"
     assert "spring" in capsys.readouterr().out
-    page = tmp_path / "again.html"
-    assert main(["report", "page", str(out), "--out", str(page)]) == 0
-    again, report = (path.read_text() for path in (page, out / "report.html"))
-    assert re.sub('data:[^"]*', "", again) == re.sub('data:[^"]*', "", report)
     figures = tmp_path / "figures"
-    words = ["report", "figures", "--out", str(figures)]
+    words = ["report", "--out", str(figures)]
     assert main([*words, "--format", "png", *map(str, traces)]) == 0
     assert {"heights.png", "ladder.png"} <= {path.name for path in figures.iterdir()}
     refused([*words, "--animation", "gif", traces[1]], "No trace of spring holds one command")
@@ -60,37 +54,32 @@ def test_bad_input_is_one_sentence(spring, refused, words, sentence):
 
 def test_robustness_leaves_numbers_figure_and_what_goes_on(spring, tmp_path, capsys):
     out, file = tmp_path / "kept", tmp_path / "robustness.json"
-    words = ["robustness", "spring", "--commands", "0.3", "--seeds", "2", "--axes", "pushes"]
+    words = [
+        "evaluate",
+        "spring",
+        "--suite",
+        "robustness",
+        "--commands",
+        "0.3",
+        "--seeds",
+        "2",
+        "--axes",
+        "pushes",
+    ]
     words += ["--threads", "1", "--out", str(out), "--json", str(file)]
     assert main(words) == 0
     data = json.loads(file.read_text())
     assert [row["axis"] for row in data["scores"]] == ["pushes", "overall"]
     assert all(0 <= row["low"] <= row["score"] <= row["high"] <= 1 for row in data["scores"])
-    assert data["command"].startswith("hop robustness spring")
+    assert data["command"].startswith("hop evaluate spring")
     assert "--axes pushes" in data["command"]
     assert (out / "robustness.svg").read_bytes().startswith(b"<?xml")
     assert "overall" in capsys.readouterr().out
     assert len(list(out.glob("spring-*.json"))) == 2
 
 
-def test_trainings_beside_each_other(tmp_path, capsys):
-    for name in ("one", "two"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "result.json").write_text(json.dumps(TRAINING))
-    page, numbers = tmp_path / "page.html", tmp_path / "numbers.json"
-    runs = [str(tmp_path / "one"), str(tmp_path / "two")]
-    assert main(["report", "page", *runs, "--out", str(page), "--json", str(numbers)]) == 0
-    assert "Learning curves" in page.read_text()
-    found = json.loads(numbers.read_text())
-    assert [row["label"] for row in found["trainings"]] == ["one", "two"]
-    assert found["trainings"][0]["curve"][1]["score_m"] == 0.005
-    assert str(page) in capsys.readouterr().out
-
-
-def test_a_page_or_figure_of_nothing_is_refused(tmp_path, refused):
-    trace = str(tmp_path / "none.parquet")
-    pages = ([], ["none", "nothing"], ["a", "b", "--out", str(tmp_path)])
-    for words in (["figures"], ["figures", trace], *(["page", *page] for page in pages)):
+def test_a_figure_of_nothing_is_refused(tmp_path, refused):
+    for words in ([], [str(tmp_path / "none.parquet")]):
         refused(["report", *words], "")
 
 

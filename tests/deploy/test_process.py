@@ -60,7 +60,7 @@ def test_a_killed_host_leaves_its_record_and_drives_that_brake(emulator, tmp_pat
     assert DriveMode.POSITION not in emulator.state().modes
     rows = recover(box).table.height
     assert rows > BEGUN
-    assert main(["report", "figures", str(box), "--out", str(tmp_path / "figures")]) == 0
+    assert main(["report", str(box), "--out", str(tmp_path / "figures")]) == 0
     assert Trace.load(box.with_suffix(".parquet")).table.height == rows
 
 

@@ -4,7 +4,7 @@ The drives are checked first; the leg is armed only when all is well and you agr
 start pose, squats, hops, sinks down and stops. Any key but those for the height stops it at once,
 as do Ctrl-C, SIGTERM and the end of the terminal; a second signal brakes and leaves. A stop stays
 until you call this again. Everything is recorded, also when the process is killed:
-`hop report figures` reads the trace, or the flight recording that a killed run leaves behind.
+`hop report` reads the trace, or the flight recording that a killed run leaves behind.
 
 CONTROLLER is a name (fast, paper, energy-shaping), a policy (.onnx), a gain file (.toml), a Python
 class (path/to/file.py:Class), or a joint trajectory from `hop excite` (.parquet), which a joint PD
@@ -81,7 +81,7 @@ def run(args: Deploy) -> None:
         f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out.",
     )
     options.say_written(done.path)
-    options.say_next(["hop", "report", "figures", done.path])
+    options.say_next(["hop", "report", done.path])
     if cause.reason not in (stop_reasons.Reason.FINISHED, stop_reasons.Reason.OPERATOR_STOP):
         errors = [event.get("controller_error", "") for event in events]
         words = [f"The leg was stopped: {cause}", *errors, _emulated(args, cause), done.complaint]

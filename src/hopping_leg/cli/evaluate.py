@@ -4,12 +4,17 @@ Every controller hops from standing, with the paper's noise and delay: 15 s at e
 through all commands in turn, 30 s up a staircase, 15 s at each rung of a ladder. Errors are apex
 minus command; negative is too low.
 
+`--suite robustness` asks how far the world may differ from what controllers believe before they
+fail: every axis (payload, friction, delay, noise, pushes, ...) is changed alone in rising levels,
+then all at once. A run of it that was killed goes on where it was.
+
 Examples:
   hop evaluate fast energy-shaping
   hop evaluate fast energy-shaping --out runs/first
   hop evaluate 'runs/*/policy.onnx' --commands 0.25,0.30 --json result.json
   hop evaluate energy-shaping --robot my_leg.toml --seeds 20 --floor stiff
   hop evaluate fast --engine pybullet --floor soft --seeds 2
+  hop evaluate fast energy-shaping --suite robustness --axes payload delay
 """
 
 import functools
@@ -20,13 +25,15 @@ from typing import Literal
 
 import tyro
 
-from hopping_leg import io, progress
+from hopping_leg import figure_style, io, progress
 from hopping_leg.cli import options
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.registry import robot_of
-from hopping_leg.evaluate import Entry, EvaluationRun, evaluate, tables, trials
+from hopping_leg.evaluate import Entry, EvaluationRun, evaluate, figures, tables, trials
 from hopping_leg.evaluate.entries import load_entries
 from hopping_leg.evaluate.report import render_videos, write_report
+from hopping_leg.evaluate.result import ResultCache
+from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
 from hopping_leg.robot import TIMESTEP, SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, Engine, NoiseAndDelay
 from hopping_leg.terminal import plain_console
@@ -74,12 +81,16 @@ class Conditions:
 class Evaluate(Conditions):
     """What is judged, where and how often."""
 
+    suite: Literal["paper", "robustness"] = "paper"
+    """The paper's trials, or those of changed worlds."""
+    axes: tuple[str, ...] = ()
+    """Axes of the suite robustness by name; default: all."""
     out: Path | None = None
     """Folder for evaluation.json, report.html and traces/, instead of naming each."""
     report: Path | None = None
     """File for the report, one self-contained HTML page."""
     traces: Path | None = None
-    """Folder for the runs as Parquet, for `hop report figures` and your own tools."""
+    """Folder for the runs as Parquet, for `hop report` and your own tools."""
     floor: Literal["soft", "stiff", "both"] = "both"
     """The robot's own contact (soft), the engine's default (stiff), or all trials on the first and
     the fixed ones on the second."""
@@ -92,6 +103,9 @@ class Evaluate(Conditions):
 def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     """Evaluate controllers, print the table, write what was asked for; notes come first there."""
     command = options.command_line("hop evaluate", args)
+    if args.suite == "robustness":
+        _judge_robustness(args, command)
+        return
     if args.out is not None:
         args = replace(
             args,
@@ -133,3 +147,18 @@ def _judge(entries: list[Entry], setup: RolloutConfig, args: Evaluate) -> Evalua
     first = judged[0]
     secondary = judged[1].evaluation if len(judged) > 1 else None
     return replace(first, evaluation=replace(first.evaluation, secondary=secondary))
+
+
+def _judge_robustness(args: Evaluate, command: str) -> None:
+    """Run the suite, print the scores, write numbers and figure."""
+    entries, setup = args.load()
+    out, heights, seeds = args.out or Path("runs/robustness"), args.commands, args.seeds
+    suite = make_suite(setup, axes=args.axes, commands=heights, repeats=seeds, seed=args.seed)
+    with progress.ShareProgress(parts=len(entries)) as bar:
+        found = run_suite(entries, suite, ResultCache(out), bar.show)
+    result = {"command": command, **found}
+    file, figure = args.json or out / "robustness.json", out / "robustness.svg"
+    tables.print_robustness(plain_console(), result)
+    options.save_json(file, result)
+    io.write_atomically(figure, figure_style.to_svg(figures.draw_robustness(result)))
+    options.say_written(file, figure)

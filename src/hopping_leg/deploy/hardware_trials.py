@@ -144,7 +144,7 @@ def _run(loop: ControlLoop, signals: list[int], recording: Path) -> LoopOutcome:
 
 def _draw(recording: Path) -> str:
     """Return the command that writes a recording's trace and draws it."""
-    return shlex.join(["hop", "report", "figures", str(recording)])
+    return shlex.join(["hop", "report", str(recording)])
 
 
 def _pace(outcome: LoopOutcome, rate: float) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from statistics import median
 from typing import Any, cast
 
@@ -268,25 +268,4 @@ def draw_robustness(result: dict[str, Any]) -> Figure:
         line[0].set_ylabel("successful / %")
     handles, labels = panels.flat[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper right", ncols=min(len(colours), 4))
-    return figure
-
-
-@styled
-def draw_learning(histories: Mapping[str, Sequence[Mapping[str, Any]]]) -> Figure:
-    """Draw the snapshots of each training, by label, as a line, the best one as a dot."""
-    figure = Figure(figsize=(WIDTH, 3.2), layout="constrained")
-    panels = figure.subplots(1, 2, sharey=True)
-    shown = (("steps", 1e-6, "experience / million steps"), ("minutes", 1.0, "time / min"))
-    for axes, (key, factor, label) in zip(panels, shown, strict=True):
-        for name, paint in controller_colours(histories).items():
-            if not (rows := histories[name]):
-                continue
-            at, score = np.array([(factor * row[key], 1e3 * row["score_m"]) for row in rows]).T
-            best = int(np.argmin(score))
-            axes.plot(at, score, color=paint, linewidth=1.2, label=name)
-            axes.plot(at[best], score[best], "o", color=paint, markersize=5)
-        axes.set_xlabel(label)
-        figure_style.plain_log(axes, "y")
-    panels[0].set_ylabel("score of the snapshot / mm")
-    panels[0].legend()
     return figure

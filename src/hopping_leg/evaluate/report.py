@@ -3,15 +3,15 @@
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from statistics import median
 from typing import Any
 
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from hopping_leg.colours import controller_colours
-from hopping_leg.evaluate import acceptance, figures, metrics, result, runner, tables, trials
-from hopping_leg.evaluate.verdict import verdict
+from hopping_leg.evaluate import figures, metrics, result, runner, tables, trials
 from hopping_leg.evaluate.video import Video, fixed_traces, render_hops
 from hopping_leg.html_page import data_uri, page_template, svg_uri, table
 from hopping_leg.robot.parameters import Robot
@@ -154,7 +154,6 @@ def write_report(judged: runner.EvaluationRun, videos: dict[str, Video] | None =
             "secondary": table(tables.SUMMARY, secondary.summary if secondary else []),
             "estimators": tables.estimator_table(evaluation.estimators),
         },
-        acceptance=acceptance.acceptance_lines(map(asdict, evaluation.summary)),
         lead=shown[:1],
         pictures=shown[1:],
         sinks=_sinks(evaluation),
@@ -177,6 +176,46 @@ def verdicts(evaluation: result.Evaluation) -> list[dict[str, str]]:
         {"controller": name, "colour": paint, "text": verdict(evaluation, name)}
         for name, paint in controller_colours(evaluation.controllers).items()
     ]
+
+
+def verdict(evaluation: result.Evaluation, controller: str) -> str:
+    """Return how near it hops to its commands, what it skips and touches, and on another floor.
+
+    Heights between and beyond the commands count, too.
+    """
+    rows = evaluation.rows(controller)
+    rows += [row for row in evaluation.ladder if row.controller == controller]
+    errors = {row: abs(row.median_error_m) for row in rows if row.hops}
+    if not errors:
+        return "does not hop at any height."
+    worst = max(errors, key=errors.__getitem__)
+    parts = [
+        f"misses its command by {_mm(median(errors.values()))} in the median of"
+        f" {len({row.command_m for row in rows})} heights and by {_mm(errors[worst])} at the worst,"
+        f" {worst.command_m:.2f} m"
+    ]
+    if still := sorted({row.command_m for row in rows} - {row.command_m for row in errors}):
+        parts.append(f"does not hop at {', '.join(f'{command:.2f}' for command in still)} m")
+    parts += [_skipped(rows), _contacts(sum(row.body_contacts for row in rows))]
+    other = evaluation.secondary
+    if other is not None and (there := [r for r in other.rows(controller) if r.hops]):
+        most = max(abs(row.median_error_m) for row in there)
+        parts.append(f"on the {other.conditions['floor']} floor misses by {_mm(most)} at the worst")
+    return f"{'; '.join(parts)}."
+
+
+def _skipped(rows: Sequence[result.Summary]) -> str:
+    skipped, hops = (sum(getattr(r, name) for r in rows) for name in ("skipped_hops", "hops"))
+    return f"skips {skipped} of {skipped + hops} hops" if skipped else "skips no hop"
+
+
+def _contacts(count: int) -> str:
+    times = "once" if count == 1 else f"{count} times"
+    return f"base or knee touch the ground {times}" if count else "only the foot touches the ground"
+
+
+def _mm(metres: float) -> str:
+    return f"{1e3 * metres:.1f} mm"
 
 
 def _sinks(evaluation: result.Evaluation) -> str:
@@ -226,7 +265,7 @@ def pictures_of(evaluation: result.Evaluation, runs: Sequence[trials.Run]) -> li
 
     def command(files: tuple[str, ...]) -> str:
         shown = files if len(files) <= 3 else (*files[:2], "...")
-        return f"hop report figures {' '.join(f'TRACES/{name}' for name in shown)}"
+        return f"hop report {' '.join(f'TRACES/{name}' for name in shown)}"
 
     return [
         {

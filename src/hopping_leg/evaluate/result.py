@@ -1,11 +1,14 @@
-"""The numbers of an evaluation, as typed records and as JSON."""
+"""The numbers of an evaluation, as typed records and as JSON; and a cache of results."""
 
+import json
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 from hopping_leg.evaluate.motor_load import MotorLoad
 from hopping_leg.evaluate.statistics import Neighbours
-from hopping_leg.io import json_text, plain
+from hopping_leg.io import json_text, plain, write_json
 
 SCHEMA = 2
 """Version of the JSON, raised when a name changes its meaning."""
@@ -183,3 +186,34 @@ def _rounded(value: Any) -> Any:  # noqa: ANN401
     if isinstance(value, list | tuple):
         return [_rounded(entry) for entry in value]
     return round(value, 9) if isinstance(value, float) and abs(value) > 1e-6 else value
+
+
+@dataclass(frozen=True)
+class ResultCache:
+    """Runs work once: its result lies in a folder and is taken from there the next time."""
+
+    folder: Path
+    on_begin: Callable[[str], None] = lambda words: None
+    """Told, in words, what begins."""
+
+    def load_or_run(
+        self, name: str, words: str, asked: dict[str, Any], work: Callable[[], dict[str, Any]]
+    ) -> dict[str, Any]:
+        """Return the kept result of the same work, or do it and keep its result.
+
+        ``asked`` is all that the result depends on; it and the result are JSON values.
+        """
+        file = self.folder / f"{name}.json"
+        asked = json.loads(json.dumps(asked))
+        if file.exists():
+            kept: dict[str, Any] = json.loads(file.read_bytes())
+            if kept["asked"] == asked:
+                return dict(kept["result"])
+        self._begin(name, asked)
+        self.on_begin(words)
+        result = work()
+        write_json(file, {"asked": asked, "result": result})
+        return dict(json.loads(file.read_bytes())["result"])
+
+    def _begin(self, name: str, asked: dict[str, Any]) -> None:
+        """Prepare for work that is not kept yet."""

@@ -1,6 +1,5 @@
 """Results as tables, in HTML for pages and in text for the terminal; lengths in mm."""
 
-import dataclasses
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -11,7 +10,6 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from hopping_leg.evaluate.acceptance import acceptance_lines
 from hopping_leg.evaluate.result import Comparison, Estimator, Evaluation, Group, Staircase, Summary
 from hopping_leg.evaluate.robustness.outcome import OVERALL
 from hopping_leg.html_page import Column, table
@@ -229,7 +227,6 @@ def print_evaluation(console: Console, evaluation: Evaluation) -> None:
     ]
     own = [evaluation.rows(name) for name in evaluation.controllers]
     lines += [_load_line(rows) for rows in own if math.isfinite(rows[0].rated_torque_share)]
-    lines += acceptance_lines(map(dataclasses.asdict, evaluation.summary))
     for line in lines:
         console.print(line, highlight=False)
 
@@ -254,7 +251,7 @@ def _load_line(rows: Sequence[Summary]) -> str:
 
 
 def print_robustness(console: Console, result: dict[str, Any]) -> None:
-    """Print notes, the scores on every axis, and what follows a change."""
+    """Print notes and the scores on every axis."""
     _print_notes(console, result["notes"])
     c = result["conditions"]
     marked = {axis["name"]: bool(axis["leaderboard"]) for axis in result["axes"]}
@@ -271,15 +268,6 @@ def print_robustness(console: Console, result: dict[str, Any]) -> None:
         f" {c['seed']}; in brackets the 95 % interval;\nR: on RealAIGym's leaderboard, too"
     )
     print_table(_text_table(columns, [*marked, OVERALL], title, caption), console)
-    if result["recovery"]:
-        print_table(_recovery_table(result), console)
-    for row in result["steps"]:
-        settled = row["settled_after_hops"]
-        console.print(
-            f"{row['controller']}, command {row['from_m']:g} to {row['to_m']:g} m:"
-            f" {'not settled' if settled is None else f'settled after {settled} hops'}.",
-            highlight=False,
-        )
 
 
 def _score(row: dict[str, Any]) -> str:
@@ -287,30 +275,6 @@ def _score(row: dict[str, Any]) -> str:
     if not math.isfinite(row["low"]):
         return score
     return f"{score} [{100 * row['low']:.0f}, {100 * row['high']:.0f}]"
-
-
-def _recovery_table(result: dict[str, Any]) -> Table:
-    """Return the hops after which each controller is back, per change and command."""
-    cells = {(r["change"], r["controller"], r["command_m"]): _back(r) for r in result["recovery"]}
-
-    def back(command: float) -> Column:
-        return Column(f"{command:g} m", lambda row: cells[*row, command])
-
-    columns = [Column("change", lambda row: row[0]), Column("controller", lambda row: row[1])]
-    columns += map(back, result["conditions"]["commands_m"])
-    return _text_table(
-        columns,
-        list(dict.fromkeys(key[:2] for key in cells)),
-        "Hops until back after a change in the middle of a run",
-        f"back: within {1e3 * result['conditions']['back_m']:g} mm of the command from there on; in"
-        " brackets\nthe error of hop 6 and later in mm; -: not back",
-    )
-
-
-def _back(row: dict[str, Any]) -> str:
-    hops, later = row["back_after_hops"], row["later_abs_error_m"]
-    size = "-" if later is None else f"{1e3 * later:.0f}"
-    return f"{'-' if hops is None else hops} [{size}]"
 
 
 def _text_table(

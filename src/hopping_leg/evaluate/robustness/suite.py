@@ -6,16 +6,14 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from hopping_leg.controllers import Controller, RolloutConfig
-from hopping_leg.evaluate import result_files, runner, trials
+from hopping_leg.evaluate import runner, trials
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range, fingerprint
+from hopping_leg.evaluate.result import ResultCache
 from hopping_leg.evaluate.robustness import axes as all_axes
-from hopping_leg.evaluate.robustness import changes, outcome
+from hopping_leg.evaluate.robustness import outcome
 from hopping_leg.evaluate.robustness.axes import AXES, JOINT, JOINT_LEVELS, NOMINAL
 from hopping_leg.evaluate.robustness.trials import JOINT_POINTS, SECONDS, make_trials
 from hopping_leg.io import safe_file_name
-
-RECOVERY = "recovery"
-"""Part that follows changes in the middle of a run; no axis, part of no score."""
 
 SCHEMA = 2
 """Version of the JSON, raised when a name changes its meaning."""
@@ -32,12 +30,9 @@ class Suite:
     commands: tuple[float, ...]
     """Desired apex heights, m."""
     repeats: int
-    """Realisations of noise, delay and perturbation per level and command, and ``changes.RUNS``
-    times as many per change in the middle of a run."""
+    """Realisations of noise, delay and perturbation per level and command."""
     seed: int
     """All randomness follows from it."""
-    recovery: bool = True
-    """Whether changes in the middle of a run are studied, too."""
     seconds: float = SECONDS
     """Duration of each trial, s."""
 
@@ -72,7 +67,7 @@ def make_suite(
     seed: int = 1000,
     seconds: float = SECONDS,
 ) -> Suite:
-    """Return a suite that can be run; without axes, all and the changes in the middle of a run.
+    """Return a suite that can be run; without axes, on all.
 
     Commands are the paper's by default, scaled to the leg.
 
@@ -85,19 +80,19 @@ def make_suite(
     trials.check_repeats(repeats)
     chosen = trials.choose_commands(setup.robot, commands)
     names = tuple(name for name in all_axes.axis_names() if not axes or name in axes)
-    return Suite(setup, names, chosen, repeats, seed, recovery=not axes, seconds=seconds)
+    return Suite(setup, names, chosen, repeats, seed, seconds)
 
 
 def run_suite(
     entries: Sequence[Entry],
     suite: Suite,
-    cache: result_files.ResultCache,
+    cache: ResultCache,
     on_progress: Callable[[str, float], None] = lambda label, share: None,
 ) -> dict[str, Any]:
     """Let every controller meet every axis; the cache keeps the result of each pair.
 
     Returns:
-        ``scores``, ``levels``, ``recovery``, ``steps``, ``axes``, ``conditions``, ``versions`` and
+        ``scores``, ``levels``, ``axes``, ``conditions``, ``versions`` and
         ``notes``, as JSON values.
 
     Raises:
@@ -107,8 +102,7 @@ def run_suite(
     for entry in entries:
         check_range(entry, suite.commands)
     result: dict[str, Any] = {"schema": SCHEMA, "scores": [], "levels": []}
-    result |= {"recovery": [], "steps": []}
-    parts = [NOMINAL, *suite.axes, *([RECOVERY] if suite.recovery else [])]
+    parts = [NOMINAL, *suite.axes]
     for entry in entries:
         outcomes: dict[str, list[outcome.Outcome]] = {}
         for number, part in enumerate(parts):
@@ -122,11 +116,7 @@ def run_suite(
                 suite.asked(entry.controller, part),
                 functools.partial(_run_part, entry.controller, suite, part, tick),
             )
-            if part == RECOVERY:
-                for name in ("recovery", "steps"):
-                    result[name] += [{"controller": entry.label, **r} for r in kept[name]]
-            else:
-                outcomes[part] = [outcome.Outcome(**row) for row in kept["outcomes"]]
+            outcomes[part] = [outcome.Outcome(**row) for row in kept["outcomes"]]
             on_progress(entry.label, (number + 1) / len(parts))
         for part, found in outcomes.items():
             result["levels"] += outcome.level_rows(entry.label, part, found)
@@ -139,10 +129,6 @@ def run_suite(
             **suite.conditions,
             "joint_points": JOINT_POINTS,
             "tolerance_m": outcome.TOLERANCE,
-            "back_m": changes.BACK,
-            "change_at_s": changes.AT,
-            "changes": list(changes.CHANGES),
-            "runs_per_change": changes.RUNS * suite.repeats,
         },
         "versions": runner.software_versions(),
         "notes": [note for entry in entries for note in entry.notes],
@@ -153,9 +139,6 @@ def _run_part(
     controller: Controller, suite: Suite, part: str, on_tick: Callable[[int, int], None]
 ) -> dict[str, Any]:
     setup, commands, repeats, seed = suite.setup, suite.commands, suite.repeats, suite.seed
-    if part == RECOVERY:
-        runs = changes.RUNS * repeats
-        return changes.study_changes(controller, setup, commands, runs, seed, on_tick)
     robot, rate, seconds = setup.robot, setup.rate, suite.seconds
     plan = make_trials(part, robot, commands, repeats, seed, rate=rate, seconds=seconds)
     return {"outcomes": [asdict(one) for one in outcome.run_axis(controller, setup, plan, on_tick)]}
@@ -179,6 +162,4 @@ def _levels(axis: str) -> Any:  # noqa: ANN401
     """Return the numbers of an axis that its results depend on."""
     if axis == JOINT:
         return [JOINT_POINTS, JOINT_LEVELS, *((one.name, one.moderate) for one in AXES)]
-    if axis == RECOVERY:
-        return [*changes.CHANGES, changes.RUNS]
     return [one.levels for one in AXES if one.name == axis]

@@ -1,0 +1,82 @@
+import dataclasses
+import re
+
+import pytest
+
+from hopping_leg.evaluate import EvaluationRun
+from hopping_leg.evaluate.report import verdict, write_report
+from hopping_leg.evaluate.video import Video
+
+COMMAND = "hop evaluate spring --commands 0.25,0.35"
+
+
+@pytest.fixture(scope="module")
+def commanded(judged):
+    return EvaluationRun(dataclasses.replace(judged.evaluation, command=COMMAND), judged.runs)
+
+
+@pytest.fixture(scope="module")
+def page(commanded):
+    return write_report(commanded).decode()
+
+
+def test_the_page_needs_nothing_from_outside_and_is_the_same_again(page, commanded):
+    sources = re.findall(r'(?:src|href)="([^"]*)"', page)
+    assert len(sources) >= 4
+    assert all(source.startswith("data:") for source in sources)
+    assert not [word for word in ("<script", "@import", "url(") if word in page]
+    assert write_report(commanded).decode() == page
+
+
+def test_the_page_states_its_numbers_and_how_to_make_it_again(page, judged):
+    assert COMMAND in page
+    for row in judged.evaluation.summary:
+        assert f"{1e3 * row.median_error_m:+.1f}" in page
+        assert f">{row.hops}<" in page
+    assert judged.evaluation.conditions["robot_digest"] in page
+    assert "hop report TRACES/spring-staircase-0.parquet" in page
+
+
+def test_names_are_escaped_a_video_is_embedded_and_a_missing_one_explained(judged, monkeypatch):
+    monkeypatch.setattr("hopping_leg.evaluate.report.draw_report_figures", lambda *_: [])
+    row = dataclasses.replace(judged.evaluation.summary[0], controller="<b>&")
+    evaluation = dataclasses.replace(judged.evaluation, summary=[row], distributions=[])
+    videos = {"spring": Video(None, "egl: no display"), "other": Video(b"RIFF")}
+    page = write_report(EvaluationRun(evaluation, judged.runs), videos).decode()
+    assert "<b>" not in page
+    assert "&lt;b&gt;&amp;" in page
+    assert "No video of spring: egl: no display" in page
+    assert "data:image/webp;base64,UklGRg==" in page
+
+
+def test_a_controller_that_never_hopped_is_reported(judged):
+    nothing = float("nan")
+    rows = [
+        dataclasses.replace(r, hops=0, median_error_m=nothing, std_m=nothing)
+        for r in judged.evaluation.summary
+    ]
+    empty = [{**entry, "apexes_m": []} for entry in judged.evaluation.distributions]
+    evaluation = dataclasses.replace(judged.evaluation, summary=rows, distributions=empty)
+    page = write_report(EvaluationRun(evaluation, judged.runs)).decode()
+    assert "nan" not in re.sub(r"data:[^\"]*", "", page)
+
+
+def test_a_verdict_names_the_worst_height_and_everything_that_went_wrong(judged):
+    low, high = judged.evaluation.summary
+    low = dataclasses.replace(low, median_error_m=-0.001, skipped_hops=0, body_contacts=0)
+    changes = {"median_error_m": 0.0034, "skipped_hops": 2, "hops": 98 - low.hops}
+    high = dataclasses.replace(high, **changes, body_contacts=1)
+
+    def said(*rows):
+        evaluation = dataclasses.replace(
+            judged.evaluation, summary=list(rows), ladder=[], secondary=None
+        )
+        return verdict(evaluation, "spring")
+
+    assert said(low, high) == (
+        "misses its command by 2.2 mm in the median of 2 heights and by 3.4 mm at the worst,"
+        " 0.35 m; skips 2 of 100 hops; base or knee touch the ground once."
+    )
+    still = dataclasses.replace(high, hops=0, median_error_m=float("nan"))
+    assert "does not hop at 0.35 m" in said(low, still)
+    assert said(still) == "does not hop at any height."
