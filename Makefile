@@ -25,8 +25,6 @@ $(STAMP): pyproject.toml constraints.txt
 	$(PIP) install $$(grep '^torch==' constraints.txt)
 	$(PIP) install -c constraints.txt hatchling editables
 	$(PIP) install -c constraints.txt --no-build-isolation -e '.[train,cluster,hardware,bench,view,ros,docs,dev]'
-	$(PIP) install -c constraints.txt --only-binary pybullet pybullet || \
-	  echo "There is no PyBullet for this Python; what needs it is left out, its tests are skipped."
 	$(BIN)/hop doctor
 	@touch $@
 reproduce: $(STAMP)

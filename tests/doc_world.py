@@ -22,10 +22,6 @@ SHORTER = {
     "hop doctor --write": {"--yes": None},
     "hop emulate": {"--seconds": "0.3", "--no-realtime": None},
     "hop evaluate": {"--seeds": "1", "--commands": "0.3", "--floor": "soft", "--no-video": None},
-    "hop evaluate --engine": {
-        "--seeds": "1", "--commands": "0.3", "--floor": "soft", "--no-video": None,
-        "--timestep": "0.001",
-    },
     "hop excite fixed-base": {
         "--amplitudes": "0.05", "--periods": "0.5", "--swings": "10", "--duration": "10",
     },

@@ -6,12 +6,12 @@ TABLES = (
     (
         "table",
         "engines.json",
-        "worlds",
-        "world",
+        "rows",
+        "engine",
         "controller",
-        "largest_median_error_m*1000=largest error, mm",
-        "mean_std_m*1000=std, mm",
-        "skipped_hops=skipped hops",
-        "ordered=heights in order",
+        "command_m=command, m",
+        "median_error_m*1000=error, mm",
+        "std_m*1000=std, mm",
+        "hops",
     ),
 )

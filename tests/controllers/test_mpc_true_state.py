@@ -14,6 +14,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.io import replace_at
 from hopping_leg.robot import GRAVITY, load_robot
 from hopping_leg.sim import LegSimulator, leg_simulator
+from hopping_leg.sim.mujoco_simulator import MujocoSimulator
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, draw_twin, sample
 from tests.controllers.measurements import hops_of
 
@@ -24,8 +25,8 @@ STEP = 2.5e-4
 """Physics step of the legs, a fourth of the planned one."""
 
 
-def hop(robot, commands, engine="stepper", legs=None):
-    setup = RolloutConfig(robot, timestep=STEP, threads=1, engine=engine)
+def hop(robot, commands, legs=None):
+    setup = RolloutConfig(robot, timestep=STEP, threads=1)
     wanted = np.tile(commands, (round(5 * setup.rate), 1))
     return rollout(TrueStateMpc(robot), setup, wanted, 0, legs=legs)
 
@@ -153,4 +154,4 @@ def test_it_is_for_simulated_legs_of_the_stepper_alone():
     with pytest.raises(UsageError, match="true state"):
         load_controller("mpc-true-state", ROBOT)
     with pytest.raises(UsageError, match="stepper"):
-        hop(ROBOT, np.array([0.3]), engine="mujoco")
+        hop(ROBOT, np.array([0.3]), MujocoSimulator(ROBOT, 1, timestep=STEP))

@@ -288,9 +288,3 @@ for _robot in ("legv1", "legv2", "legv2-paper", "twin"):
 def record_doublependulum(folder: Path) -> Values:
     """A recording of the robot that cannot hop."""
     return _columns(_recorded(folder, "fixed-base", "doublependulum", "--swings", 4))
-
-
-@case("rollout-pybullet", 1e-4, needs="pybullet")
-def rollout_pybullet(folder: Path) -> Values:
-    """The other engine."""
-    return hopped("legv2-paper", 1.0, engine="pybullet")

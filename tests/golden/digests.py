@@ -13,7 +13,7 @@ FILE = Path(__file__).with_name("digests.json")
 
 _LIBRARIES = (
     "numpy", "scipy", "torch", "mujoco", "onnx", "onnxruntime", "stable-baselines3", "polars",
-    "pybullet", "moteus",
+    "moteus",
 )  # fmt: skip
 _SWITCHES = ("OPENBLAS_CORETYPE", "ATEN_CPU_CAPABILITY", "NPY_DISABLE_CPU_FEATURES", "MKL_CBWR")
 

@@ -120,28 +120,6 @@ def test_mujoco_reads_the_same_dynamics_from_the_urdf(seed):
     check_mass_and_bias(robot, model, data, q, qd, [0, robot.hip.armature, robot.knee.armature])
 
 
-def test_pybullet_reads_the_same_masses_from_the_urdf(tmp_path):
-    bullet = pytest.importorskip("pybullet", reason="needs the extra 'bullet'")
-    robot = load_robot("legv2")
-    path = tmp_path / "leg.urdf"
-    path.write_text(to_urdf(robot))
-    world = bullet.connect(bullet.DIRECT)
-    leg = bullet.loadURDF(str(path), useFixedBase=True, physicsClientId=world)
-    masses = {
-        bullet.getJointInfo(leg, joint, physicsClientId=world)[12].decode(): bullet.getDynamicsInfo(
-            leg, joint, physicsClientId=world
-        )[0]
-        for joint in range(bullet.getNumJoints(leg, physicsClientId=world))
-    }
-    bullet.disconnect(world)
-    assert masses == {
-        "base": robot.base.mass,
-        "thigh": robot.thigh.mass,
-        "shank": robot.shank.mass,
-        "foot": 0.0,
-    }
-
-
 @pytest.mark.parametrize("name", shipped_robots())
 def test_limits_and_belt_stand_in_the_file(name):
     robot = load_robot(name)

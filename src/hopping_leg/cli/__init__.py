@@ -159,7 +159,6 @@ _EXTRAS = {
     **dict.fromkeys(("torch", "stable_baselines3", "onnx", "tensorboard"), "train"),
     **dict.fromkeys(("moteus", "can", "serial", "msgpack"), "hardware"),
     **dict.fromkeys(("mcap", "mcap_ros2"), "ros"),
-    "pybullet": "bullet",
     "viser": "view",
     "playwright": "dev",
 }

@@ -13,7 +13,6 @@ Examples:
   hop evaluate fast energy-shaping --out runs/first
   hop evaluate 'runs/*/policy.onnx' --commands 0.25,0.30 --json result.json
   hop evaluate energy-shaping --robot my_leg.toml --seeds 20 --floor stiff
-  hop evaluate fast --engine pybullet --floor soft --seeds 2
   hop evaluate fast energy-shaping --suite robustness --axes payload delay
 """
 
@@ -35,7 +34,7 @@ from hopping_leg.evaluate.report import render_videos, write_report
 from hopping_leg.evaluate.result import ResultCache
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
 from hopping_leg.robot import TIMESTEP, SoftLimits, load_robot
-from hopping_leg.sim import CONTROL_RATE, NO_NOISE, Engine, NoiseAndDelay
+from hopping_leg.sim import CONTROL_RATE, NO_NOISE, NoiseAndDelay
 from hopping_leg.terminal import plain_console
 
 
@@ -92,10 +91,8 @@ class Evaluate(Conditions):
     traces: Path | None = None
     """Folder for the runs as Parquet, for `hop report` and your own tools."""
     floor: Literal["soft", "stiff", "both"] = "both"
-    """The robot's own contact (soft), the engine's default (stiff), or all trials on the first and
+    """The robot's own contact (soft), MuJoCo's default (stiff), or all trials on the first and
     the fixed ones on the second."""
-    engine: Engine = "stepper"
-    """Physics engine; pybullet needs the extra `bullet` and is much slower."""
     video: bool = True
     """Put a short video of each controller into the report, if OpenGL is available."""
 
@@ -114,7 +111,7 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
             traces=args.traces or args.out / "traces",
         )
     entries, setup = args.load()
-    judged = _judge(entries, replace(setup, engine=args.engine), args)
+    judged = _judge(entries, setup, args)
     notes = [*notes, *judged.evaluation.notes]
     judged = replace(judged, evaluation=replace(judged.evaluation, command=command, notes=notes))
     tables.print_evaluation(plain_console(), judged.evaluation)

@@ -14,14 +14,10 @@ from hopping_leg.robot import TIMESTEP, Robot, SoftLimits, kinematics
 from hopping_leg.sim import (
     CONTROL_RATE,
     LOADS,
-    Engine,
-    Ground,
     LegSimulator,
     NoiseAndDelay,
     Plant,
     Simulator,
-    check_ground,
-    make_simulator,
 )
 from hopping_leg.sim.perturbation import Perturbation, Perturber
 from hopping_leg.trace import COLUMNS, Trace
@@ -49,14 +45,9 @@ class RolloutConfig:
     takes the paper leg's 0.2 m, scaled to the links."""
     threads: int = 0
     """Worker threads, 0 for one per core."""
-    engine: Engine = "stepper"
-    """What computes the physics."""
-    ground: Ground = "robot"
-    """What the foot stands on."""
 
     def __post_init__(self) -> None:
         self.robot.require_leg()
-        check_ground(self.engine, self.ground)
         for name in ("rate", "timestep"):
             value = getattr(self, name)
             if not 0 < value < np.inf:
@@ -139,13 +130,11 @@ def rollout(
     ticks, count = commands.shape
     if perturbation is None:
         perturber = None
-        legs = legs or make_simulator(
-            config.robot, count, engine=config.engine, ground=config.ground, rate=config.rate,
-            timestep=config.timestep, threads=config.threads,
+        legs = legs or LegSimulator(
+            config.robot, count, rate=config.rate, timestep=config.timestep,
+            threads=config.threads,
         )  # fmt: skip
     else:
-        if config.engine != "stepper":
-            raise UsageError(f"Perturbations need the engine stepper, not {config.engine}.")
         legs = LegSimulator(
             config.robot, len(perturbation.robots), rate=config.rate, timestep=config.timestep,
             threads=config.threads, robots=perturbation.robots,
@@ -188,8 +177,6 @@ def rollout(
         "seed": seed,
         "rate_hz": config.rate,
         "timestep_s": config.timestep,
-        "engine": config.engine,
-        "ground": config.ground,
     }
     columns = dict(zip(_COLUMNS, data, strict=True))
     return Rollout(np.arange(ticks) / config.rate, columns | internals, header)

@@ -12,7 +12,7 @@ from hopping_leg.evaluate import aggregation, motor_load, result, trials
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range
 from hopping_leg.io import versions
 from hopping_leg.robot import JOINTS, TIMESTEP, braking_times
-from hopping_leg.sim import NO_NOISE, Engine
+from hopping_leg.sim import NO_NOISE
 
 
 @dataclass(frozen=True)
@@ -90,16 +90,14 @@ def evaluate(
             conditions={
                 **setup_conditions(setup),
                 "floor": floor,
-                "floor_meaning": _FLOOR_MEANINGS.get(world.ground, trials.FLOORS[floor]),
-                "engine": world.engine,
-                "ground": world.ground,
+                "floor_meaning": trials.FLOORS[floor],
                 "contact_time_constant_s": world.robot.contact.time_constant,
                 "contact_damping_ratio": world.robot.contact.damping_ratio,
                 "motors": motor_load.constants(world.robot),
                 "seed": seed,
                 "seeds": repeats,
             },
-            versions=software_versions(setup.engine),
+            versions=software_versions(),
             notes=notes,
         ),
         runs,
@@ -165,12 +163,6 @@ def _note_stopped(label: str, runs: Sequence[trials.Run], setup: RolloutConfig) 
     ]
 
 
-_FLOOR_MEANINGS = {
-    "spring": "the spring and damper of the robot's contact as PyBullet's",
-    "rigid": "PyBullet's own rigid contact",
-}
-
-
 def setup_conditions(setup: RolloutConfig) -> dict[str, Any]:
     """Return what results depend on of what controllers believe, as JSON values."""
     return {
@@ -184,8 +176,6 @@ def setup_conditions(setup: RolloutConfig) -> dict[str, Any]:
     }
 
 
-def software_versions(engine: Engine = "stepper") -> dict[str, str]:
+def software_versions() -> dict[str, str]:
     """Return the versions that the numbers may depend on."""
-    names = ["hopping-leg", "mujoco", "numpy", "scipy", "onnxruntime"]
-    names += ["pybullet"] if engine == "pybullet" else []
-    return versions(*names)
+    return versions("hopping-leg", "mujoco", "numpy", "scipy", "onnxruntime")

@@ -97,7 +97,7 @@ def within(trial: Trial, bounds: tuple[float, float] | None) -> bool:
 
 
 FLOORS = {"soft": "the robot's own contact", "stiff": "MuJoCo's default contact, solref 0.02 1"}
-"""Grounds to be judged on; in PyBullet the stiff one is its own rigid contact."""
+"""Grounds to be judged on."""
 
 Progress = Callable[[float], None]
 """Called with the share done, 0 to 1."""
@@ -138,8 +138,6 @@ def on_floor(setup: RolloutConfig, floor: str) -> RolloutConfig:
     Raises:
         UsageError: There is no such floor.
     """
-    if floor == "stiff" and setup.engine == "pybullet":
-        return replace(setup, ground="rigid")
     return replace(setup, robot=floor_robot(setup.robot, floor))
 
 

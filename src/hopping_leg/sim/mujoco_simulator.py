@@ -1,4 +1,4 @@
-"""The same leg in MuJoCo: the reference for the stepper, and an engine of its own."""
+"""The same leg in MuJoCo: the reference for the stepper."""
 
 from collections.abc import Callable
 
@@ -42,8 +42,8 @@ class MujocoSimulator(Simulator):
         super().__init__(robot, count, rate, timestep)
         if not robot.reality.neutral:
             raise UsageError(
-                f"{robot.name} has a [reality], which the engine mujoco does not simulate; leave"
-                " --engine out."
+                f"{robot.name} has a [reality], which MuJoCo does not simulate; take the stepper,"
+                " LegSimulator."
             )
         spec = get_spec(robot, timestep)
         if edit is not None:

@@ -1,7 +1,6 @@
 """What every physics engine offers: many legs of one robot, stepped at the control rate."""
 
 from abc import ABC, abstractmethod
-from typing import Literal
 
 import numpy as np
 
@@ -10,15 +9,8 @@ from hopping_leg.errors import UsageError
 from hopping_leg.robot import Robot, kinematics
 from hopping_leg.sim.stepper import LOADS
 
-Engine = Literal["stepper", "mujoco", "pybullet"]
-"""What computes the physics: the leg's own stepper, MuJoCo as its reference, or PyBullet."""
-
 CONTROL_RATE = 200.0
 """Control rate of the paper, Hz."""
-
-Ground = Literal["robot", "spring", "rigid"]
-"""What the foot stands on: the robot's ground; in PyBullet, where that comes as a force, also its
-spring and damper as the contact's, or PyBullet's own rigid contact."""
 
 
 class Simulator(ABC):

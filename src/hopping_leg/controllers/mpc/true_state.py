@@ -26,11 +26,11 @@ class TrueStateMpc(Planner):
         """Take the legs, live.
 
         Raises:
-            UsageError: They are of another engine than the stepper.
+            UsageError: They are not the stepper's.
         """
         if not isinstance(legs, LegSimulator):
             raise UsageError(
-                "MPC in the true state plans on the engine stepper; leave --engine out."
+                "MPC in the true state plans on the stepper; let it meet a LegSimulator."
             )
         self._legs = legs
 

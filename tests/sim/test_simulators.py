@@ -1,4 +1,4 @@
-"""The mechanics that every engine obeys."""
+"""The mechanics that the stepper and MuJoCo, its reference, obey."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.rollout import RolloutConfig, rollout
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import GRAVITY, load_robot
-from hopping_leg.sim import NO_NOISE, make_simulator
+from hopping_leg.sim import NO_NOISE, LegSimulator
 from hopping_leg.sim.mujoco_simulator import MujocoSimulator
 from tests.sim.legs import POSTURE, STEP, energy, with_joints, without_friction
 
@@ -15,14 +15,13 @@ PAPER = load_robot("legv2-paper")
 FRICTIONLESS = without_friction(load_robot("legv2"))
 
 
-@pytest.fixture(params=["stepper", "mujoco", "pybullet"])
+KINDS = {"stepper": LegSimulator, "mujoco": MujocoSimulator}
+
+
+@pytest.fixture(params=KINDS)
 def make(request):
     """Return a function that makes simulators."""
-    if request.param == "pybullet":
-        pytest.importorskip("pybullet", reason="needs the extra 'bullet'")
-    return lambda robot, count, **options: make_simulator(
-        robot, count, engine=request.param, threads=1, **options
-    )
+    return lambda robot, count, **options: KINDS[request.param](robot, count, threads=1, **options)
 
 
 def test_energy_is_conserved_without_friction(make):
@@ -96,21 +95,20 @@ def hops(engine, robot, ticks=400):
 
     The legs fall a little first: whether a foot at zero distance touches is up to rounding.
     """
-    config = RolloutConfig(
-        robot=robot, engine=engine, disturbance=NO_NOISE, timestep=STEP, threads=1
-    )
+    config = RolloutConfig(robot=robot, disturbance=NO_NOISE, timestep=STEP, threads=1)
+    legs = KINDS[engine](robot, 2, timestep=STEP, threads=1)
     commands = np.tile([0.28, 0.33], (ticks, 1))
     controller = load_controller("energy-shaping", robot)
 
     def drop(legs):
         legs.stand(slice(None), POSTURE, 0.01)
 
-    return rollout(controller, config, commands, 0, on_legs=drop).data["height_m"]
+    return rollout(controller, config, commands, 0, on_legs=drop, legs=legs).data["height_m"]
 
 
 @pytest.mark.parametrize("engine", ["stepper", "mujoco"])
 def test_what_became_unstable_stays_so_and_its_neighbour_goes_on(engine):
-    alone, legs = (make_simulator(PAPER, count, engine=engine, threads=1) for count in (1, 2))
+    alone, legs = (KINDS[engine](PAPER, count, threads=1) for count in (1, 2))
     alone.stand(slice(None), POSTURE)
     legs.stand(slice(None), POSTURE)
     legs.qd[0] = 1e12
@@ -134,7 +132,7 @@ def test_motor_line_gain_load_friction_and_pushes_are_the_steppers():
     robot = with_joints(CAD, torque_gain=0.8, load_friction=0.2)
     reference, legs = (
         MujocoSimulator(robot, 4, threads=1, edit=tight),
-        make_simulator(robot, 4, threads=1),
+        LegSimulator(robot, 4, threads=1),
     )
     rng = np.random.default_rng(0)
     push = rng.normal(0, 5, 4)
@@ -153,7 +151,6 @@ def test_motor_line_gain_load_friction_and_pushes_are_the_steppers():
     assert limited > 10
 
 
-@pytest.mark.parametrize("make", ["mujoco", "pybullet"], indirect=True)
-def test_engines_that_simulate_no_reality_refuse_it(make):
+def test_mujoco_simulates_no_reality_and_refuses_it():
     with pytest.raises(UsageError, match="reality"):
-        make(load_robot("twin"), 1)
+        MujocoSimulator(load_robot("twin"), 1)

@@ -1,4 +1,4 @@
-"""One leg in one PyBullet world.
+"""Legs in PyBullet, another engine: does a controller lean on what only MuJoCo's physics does?
 
 URDF knows no reflected inertia (armature) and PyBullet has no other place for it, so it becomes
 inertia that turns as the armature does:
@@ -13,15 +13,17 @@ Both together give the closed form's mass matrix, in the air and against the gro
 
 import dataclasses
 import tempfile
+import weakref
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from hopping_leg.arrays import Array
+from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import RobotError, UsageError
-from hopping_leg.robot import GRAVITY, Robot, to_urdf
+from hopping_leg.robot import GRAVITY, TIMESTEP, MotorLimit, Robot, to_urdf
+from hopping_leg.sim.simulator import CONTROL_RATE, Simulator
 
 ROTOR = "knee_rotor"
 """Name of the rotor's link and joint."""
@@ -35,42 +37,28 @@ _ITERATIONS = 50
 _NO_LIMIT = 1e6
 """In place of PyBullet's own limits of speed and force."""
 
-Spring = tuple[float, float]
-"""Stiffness, N/m, and damping, N s/m, of the ground."""
-
 
 class PyBulletWorld:
     """A leg, its ground and nothing else; coordinates are (rail height, hip, knee).
 
     Coulomb friction is a motor that holds the joint's speed at zero with that much torque at most;
     viscous damping is the URDF's. PyBullet's own damping of bodies (0.04 of their speed per
-    second) and its limit of joint speeds (100 rad/s) are off. Without a ``spring`` the ground is
-    rigid; a foot that does not collide gets its contact as a push.
+    second) and its limit of joint speeds (100 rad/s) are off.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        timestep: float,
-        *,
-        spring: Spring | None = None,
-        foot_collides: bool = True,
-    ) -> None:
+    def __init__(self, robot: Robot, timestep: float) -> None:
         self._bullet = bullet = import_pybullet()
         self._id = bullet.connect(bullet.DIRECT)
         self._world = {"physicsClientId": self._id}
         if self._id < 0:
-            raise UsageError(
-                "PyBullet has no world left for another leg; simulate fewer at once, or leave"
-                " --engine out."
-            )
+            raise UsageError("PyBullet has no world left for another leg; simulate fewer at once.")
         bullet.setGravity(0, 0, -GRAVITY, **self._world)
         solver = {"numSolverIterations": _ITERATIONS, "solverResidualThreshold": 0}
         bullet.setPhysicsEngineParameter(fixedTimeStep=timestep, **solver, **self._world)
-        self._leg = self._load(pybullet_urdf(robot, foot_collides=foot_collides))
+        self._leg = self._load(pybullet_urdf(robot))
         self._joints = self._find_joints()
         self._make_free(robot)
-        self._add_ground(robot, spring)
+        self._add_ground(robot)
 
     def _load(self, urdf: str) -> int:
         with tempfile.TemporaryDirectory() as folder:
@@ -107,14 +95,11 @@ class PyBulletWorld:
         self._coordinates = [joints[name] for name in ("rail", "hip", "knee")]
         self._motors = [joints["hip"], joints["knee"]]
 
-    def _add_ground(self, robot: Robot, spring: Spring | None) -> None:
+    def _add_ground(self, robot: Robot) -> None:
         bullet = self._bullet
         shape = bullet.createCollisionShape(bullet.GEOM_PLANE, **self._world)
         ground = bullet.createMultiBody(0, shape, **self._world)
-        surface: dict[str, float] = {"lateralFriction": robot.contact.friction}
-        if spring is not None:
-            surface |= {"contactStiffness": spring[0], "contactDamping": spring[1]}
-        bullet.changeDynamics(ground, -1, **surface, **self._world)
+        bullet.changeDynamics(ground, -1, lateralFriction=robot.contact.friction, **self._world)
 
     def put(self, state: Array) -> None:
         """Give the leg a state (x, q1, q2 and their rates), (6,)."""
@@ -135,20 +120,6 @@ class PyBulletWorld:
         joints = bullet.getJointStates(self._leg, self._coordinates, **self._world)
         return np.array([joint[0] for joint in joints] + [joint[1] for joint in joints])
 
-    def push(self, force: Array, place: Array) -> None:
-        """Push the shank during the next step by an upward and forward force, N, (2,).
-
-        ``place`` is the height above the ground and the forward offset from the hip, m, (2,).
-        """
-        self._bullet.applyExternalForce(
-            self._leg,
-            self._joints["knee"],
-            [float(force[1]), 0.0, float(force[0])],
-            [float(place[1]), 0.0, float(place[0])],
-            self._bullet.WORLD_FRAME,
-            **self._world,
-        )
-
     def close(self) -> None:
         """Free the world; PyBullet has room for about a thousand."""
         if self._id >= 0:
@@ -166,16 +137,15 @@ def import_pybullet() -> Any:  # noqa: ANN401
         import pybullet
     except ModuleNotFoundError as error:
         raise UsageError(
-            "This engine needs PyBullet; install it with `pip install 'hopping-leg[bullet]'`."
+            "This study needs PyBullet; install it with `pip install pybullet`."
         ) from error
     return pybullet
 
 
-def pybullet_urdf(robot: Robot, *, foot_collides: bool = True) -> str:
+def pybullet_urdf(robot: Robot) -> str:
     """Return the URDF to be loaded with ``URDF_USE_INERTIA_FROM_FILE``.
 
-    The fixed frame ``foot`` is left out, which nothing here asks for, and the rail is long. Knee
-    and base collide in any case.
+    The fixed frame ``foot`` is left out, which nothing here asks for, and the rail is long.
 
     Raises:
         RobotError: The base is too light to give the rotor its mass.
@@ -183,7 +153,7 @@ def pybullet_urdf(robot: Robot, *, foot_collides: bool = True) -> str:
     if robot.base.mass <= _ROTOR_MASS:
         raise RobotError(
             f"The base of {robot.name} weighs {robot.base.mass:g} kg but must weigh more than"
-            f" {_ROTOR_MASS:g} kg in PyBullet; leave --engine out."
+            f" {_ROTOR_MASS:g} kg in PyBullet."
         )
     base = dataclasses.replace(robot.base, mass=robot.base.mass - _ROTOR_MASS)
     inertia = robot.thigh.inertia + robot.hip.armature
@@ -193,9 +163,6 @@ def pybullet_urdf(robot: Robot, *, foot_collides: bool = True) -> str:
         root.remove(element)
     for limit in root.iterfind("joint[@name='rail']/limit"):
         limit.attrib.update(lower="-1000", upper="1000")
-    if not foot_collides:
-        for shank in root.iterfind("link[@name='shank']"):
-            shank.remove(shank.findall("collision")[-1])
     _add_rotor(root, robot.knee.armature)
     return Xml.tostring(root, encoding="unicode")
 
@@ -210,3 +177,67 @@ def _add_rotor(root: Xml.Element, inertia: float) -> None:
     Xml.SubElement(joint, "parent", link="base")
     Xml.SubElement(joint, "child", link=ROTOR)
     Xml.SubElement(joint, "axis", xyz="0 -1 0")
+
+
+class PyBulletSimulator(Simulator):
+    """Legs in PyBullet, each in a world of its own, one after the other, on rigid ground.
+
+    Dynamics, motors' limits, friction and damping are those of ``LegSimulator``, see
+    ``pybullet_urdf``; stops are rigid.
+
+    Raises:
+        UsageError: PyBullet is not installed, the physics step does not divide the control period,
+            or the robot has a ``reality`` or friction that grows with load.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        count: int,
+        *,
+        rate: float = CONTROL_RATE,
+        timestep: float = TIMESTEP,
+    ) -> None:
+        super().__init__(robot, count, rate, timestep)
+        friction = "a 'load_friction'" if robot.of_joints("load_friction").any() else ""
+        if beyond := friction if robot.reality.neutral else "effects in [reality]":
+            raise UsageError(
+                f"{robot.name} has {beyond}, which PyBullet does not simulate; take a robot"
+                " without, e.g. legv2-paper."
+            )
+        self._worlds = [PyBulletWorld(robot, timestep) for _ in range(count)]
+        self._finalizer = weakref.finalize(self, _close, self._worlds)
+        self._show(np.zeros((count, 6)))
+        self._known = np.full((count, 6), np.nan)
+        self._motors = MotorLimit(robot)
+        self._applied = np.zeros((count, 2))
+
+    @property
+    def measured_torque(self) -> Array:
+        """What the motors' torque measurement reports now, N m at the joints, (n, 2)."""
+        return self._applied
+
+    def place(self, ids: IntArray | slice, height: Array | float, q: Array) -> None:
+        """Put legs at rest at a height, m, and posture, rad."""
+        self._applied = np.zeros((self.count, 2))
+        self.state[ids] = 0
+        self.height[ids] = height
+        self.q[ids] = q
+
+    def step(self, torque: Array) -> Array:
+        """Command joint torques for a control period; return the motors' mean, N m, (n, 2)."""
+        for moved in np.flatnonzero((self.state != self._known).any(axis=1)):
+            self._worlds[moved].put(self.state[moved])
+        total = np.zeros((self.count, 2))
+        for _ in range(self.substeps):
+            self._applied = self._motors.give(torque, self.qd)
+            for leg, world in enumerate(self._worlds):
+                self.state[leg] = world.step(self._applied[leg], 1)
+            total += self._applied
+        self._known[:] = self.state
+        return total / self.substeps
+
+
+def _close(worlds: list[PyBulletWorld]) -> None:
+    for world in worlds:
+        world.close()
