@@ -27,7 +27,6 @@ SHORTER = {
     },
     "hop excite moving-base": {"--amplitudes": "0.05", "--periods": "0.5", "--duration": "10"},
     "hop excite multisine": {"--duration": "10"},
-    "hop excite optimal": {"--duration": "8", "--generations": "1"},
     "hop identify": {"--parameters": "hip.friction,knee.friction"},
     "hop record --transport": {"--yes": None},
     "hop train": {"--steps": "1", "--heights": "0.28 0.32"},

@@ -10,8 +10,6 @@ RESULTS = (
     "studies/identification/results/known_legs.json",
     "python -m studies.identification --parts coverage --json "
     "studies/identification/results/coverage.json",
-    "python -m studies.identification --parts excitations --json "
-    "studies/identification/results/excitations.json",
     "python -m studies.identification --parts paper-size --searches two-pass --json "
     "studies/identification/results/paper_size.json",
     "python -m studies.identification --parts recordings --json "
@@ -38,18 +36,6 @@ TABLES = (
         "parameter",
         "share_inside=intervals that hold the truth",
         "rms_error_over_half_width=error over half width, rms",
-    ),
-    ("table", "excitations.json", "bars", "what", "bar", "measured", "unit", "reached"),
-    (
-        "table",
-        "excitations.json",
-        "excitations.rows",
-        "legs",
-        "excitation",
-        "recorded_s=recorded, s",
-        "error=error, changes that matter, rms",
-        "geometric_mean=geometric mean over parameters",
-        "failed",
     ),
     ("table", "paper_size.json", "bars", "what", "bar", "measured", "unit", "reached"),
     ("table", "recordings.json", "bars", "what", "bar", "measured", "unit", "reached"),

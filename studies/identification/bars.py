@@ -67,24 +67,10 @@ def _speed(result: dict[str, Any]) -> list[Bar]:
             ("independent arms: 95 % intervals that hold the truth", 90.0, "%", share, True),
             ("independent arms, 12 s each: longest fit", 10.0, "s", longest, False),
         ]
-    found += _excitations(result)
     for row in result.get("paper_size", {}).get("rows", []):
         what = f"{row['recorded_s']:g} s of recordings: {row['method']}"
         found.append((what, 90.0, "s", 60 * row["wall_minutes"], False))
     return found
-
-
-def _excitations(result: dict[str, Any]) -> list[Bar]:
-    """Return the error after a quarter of the time with optimal excitations over the usual's."""
-    rows = result.get("excitations", {}).get("rows", [])
-    return [
-        (
-            f"{short['legs']}, {short['excitation']}, {short['recorded_s']:g} s: error over"
-            f" {long['recorded_s']:g} s of the usual",
-            1.0, "times", short["error"] / long["error"], False,
-        )
-        for long, short in zip(rows[::2], rows[1::2], strict=True)
-    ]  # fmt: skip
 
 
 def _friction(result: dict[str, Any]) -> list[Bar]:

@@ -17,7 +17,6 @@ from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.identify.result import software_versions
 from hopping_leg.identify.search import Report
 from hopping_leg.terminal import plain_console
-from studies.identification import excitations
 from studies.identification.arm import coverage
 from studies.identification.bars import bars
 from studies.identification.fits import METHODS
@@ -33,7 +32,6 @@ PARTS = (
     "synthetic",
     "throughput",
     "coverage",
-    "excitations",
     "mujoco-sysid",
     "paper-size",
     "recordings",
@@ -98,18 +96,6 @@ def bench_identify(
             {"arms": study.arms, "seed": study.seed, "threads": study.threads},
             lambda: coverage(study.arms, ARM_SECONDS, study.seed, study.threads, on_repeat),
         )
-    if "excitations" in parts:
-        result["excitations"] = cache.load_or_run(
-            "excitations",
-            "optimal excitations",
-            {"legs": study.legs, "seed": study.seed},
-            lambda: excitations.compare(
-                study.legs,
-                study.seed,
-                study.threads,
-                lambda stage, share: cache.report(stage, share, 0.0),
-            ),
-        )
     if "mujoco-sysid" in parts:
         result["mujoco_sysid"] = mujoco_sysid(study, cache, result["synthetic"]["rows"])
         result["mujoco_sysid"]["side_by_side"] = _beside(result)
@@ -161,8 +147,8 @@ class Identify(Study):
     """
 
     parts: tuple[str, ...] = ()
-    """Of synthetic, throughput, coverage, excitations, mujoco-sysid, paper-size, recordings and
-    friction; default: all."""
+    """Of synthetic, throughput, coverage, mujoco-sysid, paper-size, recordings and friction;
+    default: all."""
     recordings: Path | None = None
     """Folder with real recordings; default: the environment's HOPPING_LEG_RECORDINGS, if set."""
     out: Path = Path("runs/bench-identify")
@@ -173,7 +159,7 @@ class Identify(Study):
     def measure(self) -> dict[str, Any]:
         """Run it, print what was to be reached and what was, return every number."""
         at_least(1, generations=self.generations, repeats=self.repeats)
-        at_least(1, threads=self.threads, arms=self.arms, legs=self.legs)
+        at_least(1, threads=self.threads, arms=self.arms)
         at_least(4, population=self.population)
         at_least(0, seed=self.seed)
         for name, least in (("seconds", 16), ("throughput_seconds", 12), ("paper_seconds", 12)):

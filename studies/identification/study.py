@@ -32,8 +32,6 @@ class Study:
     """Of each recording of the paper's size."""
     arms: int = 120
     """Independent arms whose truth intervals have to hold."""
-    legs: int = 10
-    """Drawn legs that excitations are compared on."""
     threads: int = 2
     """Of the fits; results do not depend on it."""
     seed: int = 0

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.excitation import Multisine
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import cut
 from hopping_leg.robot import COARSE_TIMESTEP, load_robot
-from studies.identification import excitations, friction, mujoco_sysid
+from studies.identification import friction, mujoco_sysid
 from studies.identification.bars import bars
 from studies.identification.fits import compare, summary
 from studies.identification.real import real
@@ -58,24 +57,6 @@ def test_a_law_of_friction_helps_where_it_is_the_truths_and_noise_helps_nothing(
     (bar,) = bars(result)
     assert bar["reached"]
     assert bar["measured"] == rows["Stribeck"]["share"]
-
-
-def test_excitations_are_compared_leg_by_leg(monkeypatch):
-    """The shorter of two multisines errs more; a fit that fails counts as the believed robot."""
-    short, long = [Multisine(duration=8.0)], [Multisine(duration=32.0)]
-    monkeypatch.setattr(excitations, "usual", lambda: {"multisine": long})
-    monkeypatch.setattr(excitations, "optimal", lambda *_: short)
-    monkeypatch.setattr(excitations, "CASES", (("arm", "multisine"),))
-    result = excitations.compare(1, 7, 1, lambda *_: None)
-    usual, shorter = result["rows"]
-    assert (usual["recorded_s"], shorter["recorded_s"]) == (32.0, 8.0)
-    assert usual["error"] < 0.1 < 1.5 * shorter["error"] / usual["error"]
-    assert usual["failed"] == 0
-    (bar,) = bars({"excitations": result})
-    assert bar["measured"] == pytest.approx(shorter["error"] / usual["error"])
-    robot = load_robot("legv2")
-    truth, leg = excitations.draw_leg(robot, [7, 0])
-    assert leg.rail.friction == truth["rail.friction"]
 
 
 def test_work_is_done_once(tmp_path):

@@ -6,15 +6,13 @@ Examples:
   hop excite fixed-base --robot legv2 --out fixed-base.parquet
   hop excite moving-base --robot legv2 --out moving-base.parquet
   hop excite fixed-base --amplitudes 0.1 0.075 --periods 1 0.5 --swings 10 --margin 0.005 --no-adapt
-  hop excite optimal --duration 15 --out air.parquet
-  hop excite optimal --rig rail --robot my_leg.toml --out ground.parquet
   hop excite multisine --centre 0.7 -1.4 --amplitude 0.3 0.4 --out multisine.parquet
 """
 
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import tyro
@@ -22,7 +20,6 @@ import tyro
 from hopping_leg.cli.options import (
     JsonFile,
     RobotFile,
-    at_least,
     save_json,
     say,
     say_next,
@@ -39,8 +36,6 @@ from hopping_leg.identify.excitation import (
     demand,
     make_excitation,
 )
-from hopping_leg.identify.optimal_excitation import Design, optimal_excitation
-from hopping_leg.progress import ShareProgress
 from hopping_leg.robot import Robot, load_robot
 
 
@@ -97,73 +92,31 @@ class MultisineCommand(Common):
     signal: Annotated[Multisine, tyro.conf.arg(name="")] = field(default_factory=Multisine)
 
 
-@dataclass(frozen=True)
-class Optimal(Common):
-    """The trajectory that tells most of the leg in its time, by what a fit of it would know.
-
-    It keeps from the ends of the joints' ranges and takes at most 80 % of what the motors give.
-    """
-
-    rig: Literal["fixed-base", "rail"] = "fixed-base"
-    """Base clamped in the air, or on the rail on the ground, after the leg was recorded in the
-    air."""
-    duration: float = 15.0
-    """Duration of the trajectory, s."""
-    generations: int = 80
-    """Generations of the search; each takes some seconds."""
-    seed: int = 0
-    """Seed of the search."""
-
-
 def run(
     args: FixedBase
     | MovingBase
-    | Optimal
     | Annotated[MultisineCommand, tyro.conf.subcommand(name="multisine")],
 ) -> None:
     """Write an excitation."""
     robot = load_robot(args.robot)
     limits = HardwareRange(args.hip_range, args.knee_range)
-    tracked = args.track_velocity
-    template, expected = (
-        _optimal(args, robot, limits)
-        if isinstance(args, Optimal)
-        else (_template(args, robot, limits), {})
-    )
     excitation = make_excitation(
-        template, robot, rate=args.rate, limits=limits, track_velocity=tracked
+        _template(args, robot, limits),
+        robot,
+        rate=args.rate,
+        limits=limits,
+        track_velocity=args.track_velocity,
     )
     excitation.save(args.out)
-    facts = _facts(excitation, robot) | expected
+    facts = _facts(excitation, robot)
     show_table(
         ("", "hip", "knee"),
         [(name, *(f"{x:.3g}" for x in pair)) for name, pair in facts["largest"].items()],
         f"{args.out}: {len(excitation)} targets for {robot.name}",
     )
     say(*excitation.description.split("; "))
-    if expected:
-        rows = [(r["name"], f"{r['error']:.2g}", r["unit"]) for r in expected["expected"]]
-        show_table(("parameter", "expected error", "unit"), rows)
     save_json(args.json, facts)
     say_next(["hop", "record", args.out, "--robot", args.robot])
-
-
-def _optimal(args: Optimal, robot: Robot, limits: HardwareRange) -> tuple[Template, dict[str, Any]]:
-    """Return the best trajectory, and how far off a fit to its recording is expected to be."""
-    at_least(1, generations=args.generations)
-    at_least(0, seed=args.seed)
-    design = Design(
-        robot, args.rig, args.duration, args.rate, limits, track_velocity=args.track_velocity
-    )
-    with ShareProgress() as bar:
-        harmonics, expected = optimal_excitation(
-            design,
-            generations=args.generations,
-            seed=args.seed,
-            report=lambda share, _: bar.show("searching", share),
-        )
-    rows = [{"name": p.name, "unit": p.unit, "error": e} for p, e in expected.items()]
-    return harmonics, {"expected": rows}
 
 
 def _template(args: MovingBase | MultisineCommand, robot: Robot, limits: HardwareRange) -> Template:
