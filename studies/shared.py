@@ -10,6 +10,7 @@ import inspect
 import json
 import os
 import platform
+import re
 import shlex
 import subprocess
 import sys
@@ -22,7 +23,6 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.cli import guard, read_options
-from hopping_leg.cli.option_help import word_of
 from hopping_leg.cli.options import KEPT, check_outputs, command_line, save_json
 from hopping_leg.errors import UsageError
 from hopping_leg.io import versions, write_atomically
@@ -62,13 +62,18 @@ def _run(name: str, options: Any, given: Sequence[str]) -> int:  # noqa: ANN401
     args = read_options(options, program, about, given)
     check_outputs(args)
     if get_args(options):
-        program = f"{program} {word_of(type(args))}"
+        program = f"{program} {_word_of(type(args))}"
     command = command_line(program, args, KEPT | {"recordings"})
     result = {"command": command, **args.measure()}
     save_json(args.json, result)
     if args.json is not None:
         print(f"Wrote {args.json}.")
     return 0
+
+
+def _word_of(kind: type) -> str:
+    """Return the word that tyro gives to a dataclass among several, e.g. ``zero-shot``."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", kind.__name__).lower()
 
 
 def results(name: str) -> tuple[str, ...]:

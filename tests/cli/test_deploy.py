@@ -182,7 +182,7 @@ EMULATE, TRANSPORT = ["emulate", "--seconds", "0"], ["doctor", "--transport"]
     ("words", "sentence"),
     [
         ([*EMULATE, "--robot", "doublependulum"], "cannot hop"),
-        ([*EMULATE, "--start-pose", "1,2,3"], "There is no pose '1,2,3'"),
+        ([*EMULATE, "--start-pose", "x"], "There is no pose 'x'"),
         ([*EMULATE, "--faults", "none.toml"], "no fault script none.toml"),
         ([*EMULATE, "--seed", "-1"], "--seed is -1"),
         ([*EMULATE, "--channel", "x"], "A channel is for CAN buses"),
@@ -230,7 +230,7 @@ def test_a_recording_holds_what_was_played_and_measured(tmp_path, rig):
 def test_wrong_input_is_one_sentence(tmp_path, refused):
     file, _ = write_sine(tmp_path, "rail", 300)
     for words, sentence in (
-        ([], "hop record needs EXCITATION"),
+        ([], "No excitation was given"),
         ([str(tmp_path / "none.parquet")], "none.parquet"),
         ([str(file), "--robot", "twinn"], "Did you mean 'twin'"),
         ([str(file), "--believed", "legv9"], "There is no robot 'legv9'"),

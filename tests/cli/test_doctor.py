@@ -49,7 +49,6 @@ HARDWARE = "pip install 'hopping-leg[hardware]'"
     ("words", "exit_code", "said"),
     [
         (["doctor"], 0, "hardware: "),
-        (["--tyro-print-completion", "bash"], 0, "emulate"),
         (["emulate", "--kinds"], 0, "late_reply"),
         (["train"], 2, "pip install 'hopping-leg[train]'"),
         (["emulate"], 2, HARDWARE),

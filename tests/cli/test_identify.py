@@ -143,7 +143,7 @@ def write_bad(folder):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ([], "hop identify needs RECORDING"),
+        ([], "No recording was named"),
         (["none.csv"], "There is no recording"),
         (["empty.csv"], "empty.csv is empty"),
         (["noise.csv"], "noise.csv is neither Parquet nor a CSV"),

@@ -2,75 +2,52 @@
 
 A verb's module has a docstring, which is its help, and a function ``run(args)``. The annotation of
 ``args`` is a frozen dataclass of options (or a union of dataclasses, which become subcommands);
-the docstring under each field is that option's help. Modules are imported only when their verb is
-called, so that ``hop --help`` is instant and nothing but training loads torch.
+the docstring under each field is that option's help, shown by tyro. Modules are imported only when
+their verb is called, so that ``hop --help`` is instant and nothing but training loads torch.
 """
 
 import contextlib
-import dataclasses
 import errno
 import importlib
 import inspect
 import io
 import itertools
 import os
+import re
 import signal
 import sys
 import threading
 import traceback
-import types
 from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
-from typing import Annotated, Any, Union, get_type_hints
+from typing import Any, get_type_hints
 
 import tyro
 
 from hopping_leg import terminal
-from hopping_leg.cli import option_help
 from hopping_leg.errors import HoppingLegError, UsageError, unknown_name
 
 VERBS = {
     "demo": "watch learned beside classical control in the browser, at once",
     "robots": "list the legs, show every number, import or check your own",
     "evaluate": "run the paper's trials for controllers and write the report",
-    "report": "draw what stored traces show",
     "train": "train a controller from scratch, or go on after an interruption",
-    "policies": "list and inspect policies",
     "excite": "write the trajectory that a leg is identified with",
-    "export": "write a leg as URDF, traces for Foxglove, rerun, ROS 2",
     "record": "play an excitation on a leg and record it",
     "identify": "fit a leg to recordings and write its robot file",
     "deploy": "run a controller on the real leg, or on emulated drives",
-    "view": "watch the leg in the browser: live, a trace, or the real one",
-    "doctor": "say what is missing here; check, configure and home a leg's drives",
     "emulate": "stand in for the real leg: two drives behind a real wire",
-    "reproduce": "the main job: train, evaluate, compare and report",
+    "doctor": "say what is missing here; check, configure and home a leg's drives",
+    "view": "watch the leg in the browser: live, a trace, or the real one",
+    "report": "draw what stored traces show",
+    "export": "write a leg as URDF, traces as MCAP for Foxglove, rerun, ROS 2",
+    "policies": "list and inspect policies",
+    "reproduce": "the main job: record, identify, train, hop, evaluate, report",
 }
 """Every verb with its line in the overview."""
 
-MEANT = {
-    "deploy": "run hardware real start",
-    "doctor": "check install setup info status diagnose",
-    "emulate": "mock simulator fake",
-    "evaluate": "simulate sim test eval benchmark run rollout judge measure score"
-    " robustness perturb disturb stress",
-    "excite": "excitation trajectory",
-    "export": "urdf save convert mcap rosbag rerun foxglove",
-    "identify": "calibrate fit sysid estimate system-identification",
-    "policies": "onnx inspect",
-    "record": "log capture play",
-    "report": "plot draw figure figures compare show graph html",
-    "reproduce": "paper all everything",
-    "robots": "legs models list import urdf mjcf",
-    "train": "learn fit-policy rl fit",
-    "view": "simulate sim watch viewer play render show visualise visualize gui",
-    "demo": "try example start hello tutorial",
-}
-"""Verbs with the words that others use for them."""
-
-_HELP, _VERSION = "--help", "--version"
-_SHELLS = ("bash", "zsh", "fish")
 _CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
+_LIST = re.compile(r"[\w.+-]+(,[\w.+-]+)+")
 
 FAILED = 2
 INTERRUPTED = 130
@@ -164,24 +141,23 @@ _EXTRAS = {
 }
 
 
-def _dispatch(arguments: list[str]) -> int:
-    if not arguments or arguments[0] in ("-h", _HELP, "help"):
+def _dispatch(words: list[str]) -> int:
+    if not words or words[0] in ("-h", "--help", "help"):
         print(overview())
         return 0
-    verb, rest = arguments[0], arguments[1:]
-    if verb in (_VERSION, "-V", "version"):
+    verb, rest = words[0], words[1:]
+    if verb in ("--version", "-V", "version"):
         print(f"hop {version('hopping-leg')}")
         return 0
-    if verb == "--tyro-print-completion":
-        return _print_completion(*rest[:1])
     if verb not in VERBS:
-        raise UsageError(unknown_name("verb", verb, VERBS, MEANT) + " Try `hop --help`.")
+        raise UsageError(unknown_name("verb", verb, VERBS) + " Try `hop --help`.")
     from hopping_leg.progress import said_if_slow
 
     with said_if_slow(f"Loading hop {verb}."):
-        module, kind = _load_verb(verb)
+        module = importlib.import_module(f"hopping_leg.cli.{verb}")
         from hopping_leg.cli.options import check_outputs
 
+    kind = get_type_hints(module.run, include_extras=True)["args"]
     args = read_options(kind, f"hop {verb}", inspect.getdoc(module), rest)
     check_outputs(args)
     module.run(args)
@@ -192,23 +168,31 @@ def read_options(
     options: Any,  # noqa: ANN401
     program: str,
     description: str | None,
-    arguments: Sequence[str],
+    words: Sequence[str],
 ) -> Any:  # noqa: ANN401
     """Return an instance of a dataclass of options, or of one of a union's, as subcommands.
 
+    Lists may be given with commas or spaces.
+
     Raises:
-        UsageError: The arguments are not as the options ask.
+        UsageError: The words are not as the options ask.
+        SystemExit: Help was asked for, and is printed.
     """
-    if any(word in ("-h", _HELP) for word in arguments):
-        print(option_help.show_help(options, program, description, arguments))
-        raise SystemExit(0)
-    words = option_help.tidy_words(options, program, arguments)
+    apart = [part for word in words for part in _parts(word)]
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):
-            return tyro.cli(options, prog=program, args=words, config=_CONFIG)
+            return tyro.cli(
+                options, prog=program, description=description, args=apart, config=_CONFIG
+            )
     except SystemExit as ended:
-        raise UsageError(f"{_sentence(said.getvalue())} `{program} {_HELP}` shows more.") from ended
+        if not ended.code:
+            raise
+        raise UsageError(f"{_sentence(said.getvalue())} `{program} --help` shows more.") from ended
+
+
+def _parts(word: str) -> list[str]:
+    return word.split(",") if _LIST.fullmatch(word) and not os.path.exists(word) else [word]  # noqa: PTH110
 
 
 def _sentence(box: str) -> str:
@@ -216,49 +200,15 @@ def _sentence(box: str) -> str:
     inside = [line.strip("\u2502 ") for line in box.splitlines()[1:-1]]
     above = itertools.takewhile(lambda line: line.strip("\u2500"), inside)
     text = " ".join(line for line in above if line)
-    return text if text.endswith((".", "!")) else f"{text}."
-
-
-def _load_verb(verb: str) -> tuple[types.ModuleType, Any]:
-    module = importlib.import_module(f"hopping_leg.cli.{verb}")
-    return module, get_type_hints(module.run, include_extras=True)["args"]
-
-
-def _print_completion(shell: str = "") -> int:
-    """Print tyro's completion script for all verbs, which are subcommands to it."""
-    if shell not in _SHELLS:
-        raise UsageError(unknown_name("shell", shell, _SHELLS))
-    verbs = [
-        Annotated[
-            dataclasses.make_dataclass(verb.capitalize(), [("args", _load_verb(verb)[1])]),
-            tyro.conf.subcommand(name=verb, description=line),
-        ]
-        for verb, line in VERBS.items()
-    ]
-    script = io.StringIO()
-    with contextlib.redirect_stdout(script), contextlib.suppress(SystemExit):
-        words = ["--tyro-print-completion", shell]
-        tyro.cli(Union[tuple(verbs)], prog="hop", args=words, config=_CONFIG)  # type: ignore[call-overload]  # noqa: UP007
-    for line in script.getvalue().splitlines():
-        # A help text of several lines would be offered as words.
-        print(line.replace("\\n", " ") if line.startswith("COMPLETION_SPEC") else line)
-    return 0
+    near = re.search(r"Perhaps you meant:\s*(--[\w-]+)", "\n".join(inside))
+    text = text if text.endswith((".", "!", "?")) else f"{text}."
+    return f"{text} Did you mean {near[1]}?" if near else text
 
 
 def overview() -> str:
     """Return what ``hop --help`` prints."""
-    return "\n\n".join(
-        [
-            option_help.columns(
-                [(f"hop {_VERSION}", "say which version this is"), ("hop demo", VERBS["demo"])]
-            ),
-            option_help.wrapped(
-                "A one-legged robot hops to commanded heights: simulate, train, evaluate, compare."
-            ),
-            option_help.columns([entry for entry in VERBS.items() if entry[0] != "demo"]),
-            option_help.wrapped(
-                "`hop VERB --help` explains a verb; `hop --tyro-print-completion bash` prints a"
-                " script that completes them in the shell (or zsh, fish)."
-            ),
-        ]
+    verbs = "\n".join(f"  {verb:<10}  {line}" for verb, line in VERBS.items())
+    return (
+        "A one-legged robot hops to commanded heights: simulate, train, evaluate, deploy.\n\n"
+        f"{verbs}\n\n`hop VERB --help` explains a verb, `hop --version` says which version this is."
     )

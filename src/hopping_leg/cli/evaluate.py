@@ -11,7 +11,7 @@ then all at once. A run of it that was killed goes on where it was.
 Examples:
   hop evaluate fast energy-shaping
   hop evaluate fast energy-shaping --out runs/first
-  hop evaluate 'runs/*/policy.onnx' --commands 0.25,0.30 --json result.json
+  hop evaluate 'runs/*/policy.onnx' --commands 0.25 0.30 --json result.json
   hop evaluate energy-shaping --robot my_leg.toml --seeds 20 --floor stiff
   hop evaluate fast energy-shaping --suite robustness --axes payload delay
 """

@@ -9,7 +9,7 @@ Examples:
   hop identify run1.csv.gz run2.csv.gz --validate run3.csv.gz --out leg.toml --json leg.json
   hop identify fixed-base.parquet moving-base.parquet --search two-pass --out paper.toml
   hop identify run1.csv.gz run2.csv.gz --json leg.json --posterior 100
-  hop identify run1.csv.gz --parameters hip.friction,knee.friction --bounds hip.friction=0,0.5
+  hop identify run1.csv.gz --parameters hip.friction knee.friction --bounds hip.friction=0,0.5
 """
 
 import math
@@ -104,6 +104,8 @@ def run(args: Identify) -> None:
         threads=args.threads,
         ray=args.ray,
     )
+    if not args.recordings:
+        raise errors.UsageError("No recording was named; make one with `hop record`.")
     recordings = [recording.load_recording(path) for path in args.recordings]
     judges = [recording.load_recording(path) for path in args.validate]
     origin = args.robot or plan.robot_of([*recordings, *judges])

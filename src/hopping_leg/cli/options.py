@@ -13,7 +13,6 @@ import tyro
 from rich.table import Column, Table
 
 from hopping_leg import io
-from hopping_leg.cli.option_help import marks_of
 from hopping_leg.errors import TraceError, UsageError
 from hopping_leg.robot import DEFAULT_ROBOT
 from hopping_leg.terminal import plain_console, print_table
@@ -139,7 +138,7 @@ def command_line(verb: str, args: Any, leave_out: Collection[str] = KEPT) -> str
         flag = f"--{name.replace('_', '-')}"
         if isinstance(value, bool):
             behind.append(flag if value else f"--no-{flag[2:]}")
-        elif any(mark is tyro.conf.Positional for mark in marks_of(hint)):
+        elif tyro.conf.Positional in getattr(hint, "__metadata__", ()):
             before += _words(value)
         else:
             behind += [flag, *_words(value)]
