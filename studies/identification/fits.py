@@ -9,10 +9,10 @@ from hopping_leg.identify.optimizers import CmaOptions
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.search import SearchOptions
+from hopping_leg.identify.search import Report, SearchOptions
 from hopping_leg.identify.validation import validate
 from hopping_leg.robot.model import COARSE_TIMESTEP
-from studies.identification.study import Clock, FitCache, Study
+from studies.identification.study import Clock, Study
 from studies.identification.twin import believed
 
 METHODS = {
@@ -24,8 +24,7 @@ METHODS = {
 
 def fit(
     study: Study,
-    cache: FitCache,
-    name: str,
+    report: Report,
     method: str,
     recordings: Sequence[Recording],
     unseen: Mapping[str, Recording],
@@ -36,16 +35,13 @@ def fit(
 
     Args:
         study: Efforts.
-        cache: Has the fit's checkpoints and hears of its progress.
-        name: Of the checkpoints' folder.
+        report: Hears of the fit's progress.
         method: One of ``METHODS``.
         recordings: To fit to.
         unseen: To judge by, by what is written of them.
         truth: What differs from where the fit begins.
         parameters: What to fit; None lets the plan decide.
     """
-    folder = cache.fit_folder(name)
-    resumed = folder.exists()
     options = IdentifyOptions(
         parameters=parameters,
         search=method,
@@ -58,9 +54,8 @@ def fit(
             believed(),
             validate=list(unseen.values()),
             options=options,
-            folder=folder,
             seed=study.seed,
-            report=cache.report,
+            report=report,
         )
     said = identified.identifiability.statements
     told = [
@@ -84,7 +79,6 @@ def fit(
         **unseen_errors(identified.hypothesis, unseen, study.threads),
         "wall_s": clock.wall,
         "cpu_s": clock.cpu,
-        "resumed": resumed,
         "candidates": sum(one.found.evaluations for one in identified.passes),
         "cost": identified.passes[-1].found.cost,
         "parameters": rows,

@@ -49,7 +49,7 @@ def real(study: Study, cache: FitCache, folder: Path) -> dict[str, Any]:
                 short,
                 f"{rig}, judged by {held.name}",
                 asked,
-                functools.partial(_split, study, cache, short, fitted, held),
+                functools.partial(_split, study, cache, fitted, held),
             )
             rows.append({"rig": rig, "held_out": held.name, **row})
     if not rows:
@@ -59,17 +59,14 @@ def real(study: Study, cache: FitCache, folder: Path) -> dict[str, Any]:
 
 
 def _split(
-    study: Study, cache: FitCache, name: str, fitted: Sequence[Recording], held: Recording
+    study: Study, cache: FitCache, fitted: Sequence[Recording], held: Recording
 ) -> dict[str, Any]:
-    folder = cache.fit_folder(name)
-    resumed = folder.exists()
     with Clock() as clock:
         identified = identify(
             fitted,
             load_robot(robot_of(fitted)),
             validate=[held],
             options=IdentifyOptions(threads=study.threads),
-            folder=folder,
             seed=study.seed,
             report=cache.report,
         )
@@ -83,7 +80,6 @@ def _split(
         "candidates": sum(one.found.evaluations for one in identified.passes),
         "wall_s": clock.wall,
         "cpu_s": clock.cpu,
-        "resumed": resumed,
     }
 
 

@@ -58,7 +58,7 @@ def bench_identify(
 
     Args:
         study: Sizes and efforts.
-        cache: Keeps each result, so that a killed benchmark goes on.
+        cache: Keeps each result.
         parts: Which of ``PARTS``.
         recordings: Folder with real recordings; None leaves them out.
         on_repeat: Called with rounds of the timing, done and in all.
@@ -106,7 +106,7 @@ def bench_identify(
                     f"paper-size-{method}",
                     f"recordings of the paper's size: {method}",
                     study.asked(method, study.paper_seconds),
-                    functools.partial(paper_size, study, cache, method),
+                    functools.partial(paper_size, study, cache.report, method),
                 )
                 for method in PAPER_METHODS
                 if method in study.searches
@@ -143,7 +143,7 @@ _VARIABLE = "HOPPING_LEG_RECORDINGS"
 class Identify(Study):
     """Identify known twins and real recordings; compare searches, mujoco.sysid and plain loops.
 
-    Each result is kept; interrupted, the same command goes on.
+    Each result is kept; interrupted, the same command goes on with the next.
     """
 
     parts: tuple[str, ...] = ()
@@ -152,7 +152,7 @@ class Identify(Study):
     recordings: Path | None = None
     """Folder with real recordings; default: the environment's HOPPING_LEG_RECORDINGS, if set."""
     out: Path = Path("runs/bench-identify")
-    """Where results are kept; finished parts are not repeated, killed fits go on."""
+    """Where results are kept; finished parts are not repeated."""
     json: Path | None = None
     """Write every number to this file."""
 

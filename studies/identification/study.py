@@ -1,17 +1,13 @@
-"""What is measured, and results that are kept so that a killed benchmark goes on."""
+"""What is measured, and results that are kept so that finished parts are not repeated."""
 
-import json
-import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Self
 
 from hopping_leg.evaluate.result import ResultCache
 from hopping_leg.identify.result import software_versions
 from hopping_leg.identify.search import Report
-from hopping_leg.io import write_json
 
 
 @dataclass(frozen=True)
@@ -58,7 +54,7 @@ class Study:
 
 @dataclass(frozen=True)
 class FitCache(ResultCache):
-    """Also keeps the checkpoints of a fit that was killed.
+    """Also knows software and tells of fits.
 
     Attributes:
         report: Told how a fit goes.
@@ -71,17 +67,6 @@ class FitCache(ResultCache):
     ) -> dict[str, Any]:
         """Return the kept result of the same work by the same software, or do it and keep it."""
         return super().load_or_run(name, words, {**asked, "software": software_versions()}, work)
-
-    def _begin(self, name: str, asked: dict[str, Any]) -> None:
-        """Note what is asked for, and forget checkpoints of anything else."""
-        file = self.folder / f"{name}.begun.json"
-        if not file.exists() or json.loads(file.read_bytes()) != asked:
-            shutil.rmtree(self.fit_folder(name), ignore_errors=True)
-        write_json(file, asked)
-
-    def fit_folder(self, name: str) -> Path:
-        """Return the folder of a fit's checkpoints."""
-        return self.folder / "fits" / name
 
 
 class Clock:

@@ -5,6 +5,7 @@ from typing import Any
 
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.search import Report
 from studies.identification.fits import fit, unseen_errors
 from studies.identification.study import FitCache, Study
 from studies.identification.twin import AIR, GROUND, Motion, believed, record, record_paper
@@ -61,7 +62,6 @@ def synthetic(study: Study, cache: FitCache) -> dict[str, Any]:
     rows, start = [], []
     for case, (short, truth, fitted, judged, methods) in CASES.items():
         for method in (m for m in methods if m in study.searches):
-            name = f"synthetic-{short}-{method}"
             asked = {
                 **study.asked(method, study.seconds),
                 "truth": truth,
@@ -69,10 +69,10 @@ def synthetic(study: Study, cache: FitCache) -> dict[str, Any]:
                 "judged": judged,
             }
             row = cache.load_or_run(
-                name,
+                f"synthetic-{short}-{method}",
                 f"known twin, {case}: {method}",
                 asked,
-                functools.partial(identify_twin, study, cache, name, case, method),
+                functools.partial(identify_twin, study, cache.report, case, method),
             )
             rows.append({"case": case, **_NOT_JUDGED, **row})
         unseen: dict[str, Recording] = {
@@ -83,9 +83,7 @@ def synthetic(study: Study, cache: FitCache) -> dict[str, Any]:
     return {"rows": rows, "start": start}
 
 
-def identify_twin(
-    study: Study, cache: FitCache, name: str, case: str, method: str
-) -> dict[str, Any]:
+def identify_twin(study: Study, report: Report, case: str, method: str) -> dict[str, Any]:
     """Identify one of ``CASES`` with one search; as ``fits.fit``."""
     _, truth, fitted, judged, _ = CASES[case]
     recordings = [record(truth, motion, study.seconds) for motion in fitted]
@@ -93,19 +91,19 @@ def identify_twin(
         motion: record(truth, motion, study.seconds) for motion in judged
     }
     parameters = BEYOND_TABLE if method == "two-pass" else _parameters(case)
-    return fit(study, cache, name, method, recordings, unseen, truth, parameters)
+    return fit(study, report, method, recordings, unseen, truth, parameters)
 
 
 def _parameters(case: str) -> tuple[str, ...] | None:
     return tuple(AIR) if case == FIXED else None
 
 
-def paper_size(study: Study, cache: FitCache, method: str) -> dict[str, Any]:
+def paper_size(study: Study, report: Report, method: str) -> dict[str, Any]:
     """Identify the twin from recordings of the paper's size.
 
     Args:
         study: Length of the recordings and effort.
-        cache: Has the checkpoints: a killed fit goes on, and then says that it was resumed.
+        report: Hears of the fit's progress.
         method: How to search.
 
     Returns:
@@ -117,14 +115,7 @@ def paper_size(study: Study, cache: FitCache, method: str) -> dict[str, Any]:
     }
     parameters = BEYOND_TABLE if method == "two-pass" else None
     found = fit(
-        study,
-        cache,
-        f"paper-size-{method}",
-        method,
-        record_paper(study.paper_seconds),
-        unseen,
-        GROUND,
-        parameters,
+        study, report, method, record_paper(study.paper_seconds), unseen, GROUND, parameters
     )
     return {
         "recorded_s": 2 * study.paper_seconds,

@@ -178,10 +178,9 @@ class IdentifyTwin(StoredJob):
         return IdentifyOptions(bounds=bounds, effort=SearchOptions(least_squares=self.effort))
 
     def run(self, *, quiet: bool) -> None:
-        """Identify and write the robot file; a fit that was killed goes on."""
+        """Identify and write the robot file."""
         believed, recordings = load_robot(self.twin.believed), self._load()
-        options, folder = self.options(recordings, believed), self.file.with_suffix("")
-        identified = identify(recordings, believed, options=options, folder=folder, resume=True)
+        identified = identify(recordings, believed, options=self.options(recordings, believed))
         content = {"asked": self.asked, **as_json(identified), "truth": self._truth(identified)}
         io.write_json(self.file.with_suffix(".json"), content)
         save_robot(identified, self.file, self.twin.believed)

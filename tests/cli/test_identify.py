@@ -2,16 +2,12 @@
 
 import json
 import re
-import signal
-import subprocess
-import sys
-import time
 
 import numpy as np
 import polars as pl
 import pytest
 
-from hopping_leg.cli import FAILED, INTERRUPTED, identify, main
+from hopping_leg.cli import FAILED, main
 from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.play_excitation import play
 from hopping_leg.robot import load_robot
@@ -44,8 +40,7 @@ def swung(robot, phase):
 
 def call(folder, *words):
     """Call the verb; return its exit code."""
-    places = ["--out", folder / "leg.toml", "--folder", folder / "run"]
-    return main(["identify", *map(str, (*words, *places))])
+    return main(["identify", *map(str, (*words, "--out", folder / "leg.toml"))])
 
 
 def test_from_recordings_to_robot_numbers_and_report(recordings, tmp_path, capsys):
@@ -86,43 +81,6 @@ def test_a_fit_that_is_worse_than_its_start_fails_and_every_file_says_so(
     said = capsys.readouterr()
     assert said.out.index("do not use it") < said.out.index("95 % interval")
     assert "do not use it" in said.err
-
-
-@pytest.mark.slow
-def test_a_killed_run_resumes_to_the_same_bytes(recordings, tmp_path):
-    words = [recordings[0], *FEW, "--generations", 12, "--seed", 7]
-    assert call(tmp_path / "whole", *words) == 0
-    folder = tmp_path / "killed"
-    places = ["--out", folder / "leg.toml", "--folder", folder / "run"]
-    command = [sys.executable, "-m", "hopping_leg.cli", "identify", *words, *places]
-    process = subprocess.Popen(
-        [str(word) for word in command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
-    state = folder / "run" / "search-cma-0.json"
-    deadline = time.monotonic() + 120
-    while time.monotonic() < deadline and (not state.exists() or _generations(state) < 2):
-        time.sleep(0.02)
-    process.send_signal(signal.SIGKILL)
-    assert process.wait() == -signal.SIGKILL
-    assert 2 <= _generations(state) < 12
-    assert not (folder / "leg.toml").exists()
-    assert call(folder, *words, "--resume") == 0
-    assert (folder / "leg.toml").read_bytes() == (tmp_path / "whole" / "leg.toml").read_bytes()
-    results = [(f / "run" / "result.json").read_bytes() for f in (folder, tmp_path / "whole")]
-    assert results[0] == results[1]
-
-
-def _generations(state):
-    return len(json.loads(state.read_text())["state"]["costs"])
-
-
-def test_an_interruption_says_how_to_go_on(recordings, tmp_path, capsys, monkeypatch):
-    def interrupt(*args, **more):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(identify, "identify", interrupt)
-    assert call(tmp_path, recordings[0]) == INTERRUPTED
-    assert "the same command goes on in" in capsys.readouterr().err
 
 
 def write_bad(folder):
@@ -177,7 +135,7 @@ def test_bad_input_is_one_sentence_and_overwrites_nothing(words, sentence, tmp_p
     files = (".csv", ".parquet", ".toml", ".json", ".")
     given = [tmp_path / w if w.endswith(files) else w for w in words]
     out = [] if "--out" in words else ["--out", tmp_path / "leg.toml"]
-    refused(["identify", *given, *out, "--folder", tmp_path / "run"], sentence)
+    refused(["identify", *given, *out], sentence)
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before, "no new folder either"
 
 

@@ -236,7 +236,6 @@ def identify(folder: Path) -> Values:
     hop(
         "identify", recording, "--validate", moving, "--parameters", "hip.friction,knee.damping",
         "--search", "least-squares", "--threads", 1, "--out", robot, "--json", told,
-        "--folder", folder / "run",
     )  # fmt: skip
     leg = load_robot(robot)
     fitted = [leg.hip.friction, leg.knee.damping]

@@ -4,7 +4,6 @@ import pickle
 import numpy as np
 import pytest
 
-from hopping_leg.errors import UsageError
 from hopping_leg.identify import optimizers
 from hopping_leg.identify.cost import Scoring
 from hopping_leg.identify.optimizers import CmaOptions, Found, cma_es, jacobian, least_squares
@@ -44,19 +43,6 @@ def test_shares_in_turn_find_the_bottom_of_their_sum():
     own = sum_of_shares(SHIFTS + BOTTOM)
     (least,) = sum_of_shares(BOTTOM[None])
     assert found.cost - least < 0.05 * (own.mean() - least)
-
-
-def test_what_a_checkpoint_knows_is_not_searched_again_and_another_searchs_is_refused(tmp_path):
-    options, file = CmaOptions(3, population=6), tmp_path / "state.json"
-    found = cma_es(squares, TWO, options, seed=1, checkpoint=file)
-    again = cma_es(lambda _: pytest.fail("searched"), TWO, options, seed=1, checkpoint=file)
-    np.testing.assert_array_equal(again.vector, found.vector)
-    with pytest.raises(UsageError, match="belongs to a search with other"):
-        cma_es(squares, TWO, options, seed=2, checkpoint=file)
-    file.write_text("[]")
-    with pytest.raises(UsageError, match="no checkpoint"):
-        least_squares(bowl, TWO, checkpoint=file)
-    assert file.read_text() == "[]"
 
 
 def test_many_starts_return_the_best_first():
@@ -157,7 +143,7 @@ def test_shares_of_the_windows_find_more_in_the_same_time():
     ends = []
     for generations, seconds in ((5, np.inf), (20, 0.5)):
         options = SearchOptions(cma=CmaOptions(generations, 10, seconds=seconds))
-        searcher = Searcher(plan, goal, options, 0, None, lambda *progress: None, None, {})
+        searcher = Searcher(plan, goal, options)
         ends.append(searcher.run(["fixed-base"])[0].found)
     whole, shared = ends
     assert shared.cost == goal(shared.vector[None])[0]

@@ -1,8 +1,7 @@
 """Identify a leg from recordings: a robot file, a JSON file and a report.
 
 The rig is recognised from a recording's header, sidecar or columns. Without --validate a quarter
-of each recording is held out and judges the fit. A run that was interrupted or killed goes on when
-the same command is called again.
+of each recording is held out and judges the fit.
 
 Examples:
   hop identify fixed-base.parquet moving-base.parquet --out my_leg.toml --report report.html
@@ -23,7 +22,6 @@ from hopping_leg import errors, io
 from hopping_leg.cli.options import (
     JsonFile,
     command_line,
-    going_on,
     save_json,
     say,
     say_next,
@@ -75,11 +73,6 @@ class Identify:
     """Threads of the physics; 0 takes every core. They change no bit of the result."""
     ray: str | None = None
     """Simulate on the Ray cluster at this address; `local` starts one on this machine."""
-    folder: Path | None = None
-    """Folder for checkpoints and the result; default: runs/identify-NAME, after --out."""
-    resume: bool = False
-    """Continue the run in the folder even if it is finished, instead of repeating it; an
-    unfinished one goes on anyway."""
 
 
 class FitProgress(LiveProgress):
@@ -120,21 +113,17 @@ def run(args: Identify) -> None:
             rate, source = r.metadata.rate_hz, r.metadata.source
             say(f"{use}: {about}, {seconds:.4g} s at {rate:g} Hz, {source}")
             say(*(f"  {warning}" for warning in r.warnings))
-    folder = args.folder or Path("runs") / f"identify-{args.out.stem}"
-    how = f"the same command goes on in {folder}, with --resume or without."
-    with going_on(how), FitProgress() as progress:
+    with FitProgress() as progress:
         identified = identify(
             recordings,
             robot,
             validate=judges,
             options=options,
-            folder=folder,
-            resume=args.resume,
             seed=args.seed,
             report=progress.update,
         )
     result.save_robot(identified, args.out, origin)
-    command = command_line("hop identify", args, ("folder", "resume", "threads", "ray"))
+    command = command_line("hop identify", args, ("threads", "ray"))
     if warning := result.warning(identified):
         say(warning)
     _show(identified)

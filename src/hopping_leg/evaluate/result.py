@@ -209,11 +209,7 @@ class ResultCache:
             kept: dict[str, Any] = json.loads(file.read_bytes())
             if kept["asked"] == asked:
                 return dict(kept["result"])
-        self._begin(name, asked)
         self.on_begin(words)
         result = work()
         write_json(file, {"asked": asked, "result": result})
         return dict(json.loads(file.read_bytes())["result"])
-
-    def _begin(self, name: str, asked: dict[str, Any]) -> None:
-        """Prepare for work that is not kept yet."""

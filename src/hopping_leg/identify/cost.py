@@ -198,16 +198,6 @@ class Objective:
         """Return the costs of search vectors (n, k), by default the paper's J, (n,)."""
         return total_costs(self.residuals(vectors), self.loss)
 
-    def about(self) -> dict[str, Any]:
-        """Return what tells this objective from others, for checkpoints."""
-        return {
-            "recordings": [r.digest or r.name for r in self.recordings],
-            "windows": repr(self.windows),
-            "base": repr(self.parameters.base),
-            "scoring": repr(self.scoring),
-            "timestep": self.timestep,
-        }
-
     def __getstate__(self) -> dict[str, Any]:
         cached = ("simulator", "_scored", "groups", "loss")
         return {k: v for k, v in self.__dict__.items() if k not in cached}

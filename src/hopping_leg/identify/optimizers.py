@@ -1,15 +1,12 @@
-"""The searches, each resumable: bounded least squares, and CMA-ES as in the paper."""
+"""The searches: bounded least squares, and CMA-ES as in the paper."""
 
-import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy import optimize
 
-from hopping_leg import cma_strategy, errors, io
+from hopping_leg import cma_strategy
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.identify.cost import RobustLoss, total_costs
 from hopping_leg.identify.parameters import ParameterSet
@@ -27,7 +24,7 @@ class LeastSquaresOptions:
     """How to search."""
 
     rounds: int = 4
-    """Restarts of the trust region; each is a checkpoint."""
+    """Restarts of the trust region."""
     evaluations: int = 6
     """Steps tried in a round."""
     step: float = 1e-3
@@ -91,29 +88,18 @@ def least_squares(
     loss: RobustLoss | None = None,
     groups: IntArray | None = None,
     start: Array | None = None,
-    about: Mapping[str, object] | None = None,
-    checkpoint: Path | None = None,
     report: Progress = lambda share, cost: None,
 ) -> Found:
-    """Search from one start; a run that was killed resumes with its round and ends the same.
+    """Search from one start, (k,), or the parameters' own.
 
-    The loss weighs residuals that no parameters explain; ``groups`` are those of ``jacobian``;
-    without a start, (k,), the search begins at the parameters'. ``about`` tells this search from
-    others, e.g. by the recordings' hashes.
-
-    Raises:
-        UsageError: The checkpoint belongs to another search.
+    The loss weighs residuals that no parameters explain; ``groups`` are those of ``jacobian``.
     """
     options = options or LeastSquaresOptions()
     low, high = parameters.bounds
     margin = np.minimum(_MARGIN, 0.25 * (high - low))
     vector = np.clip(np.zeros(len(low)) if start is None else start, low + margin, high - margin)
-    identity = _identity(parameters, vector, options, about)
     history: list[float] = []
     evaluations = 0
-    if saved := _load_state(checkpoint, identity):
-        vector, evaluations = np.array(saved["vector"]), int(saved["evaluations"])
-        history = list(saved["history"])
     while len(history) < options.rounds and not _settled(history, options.tolerance):
         least = history[-1] if history else np.inf
         rounds = len(history)
@@ -129,8 +115,6 @@ def least_squares(
         vector, cost = result.x, 2 * float(result.cost)
         evaluations += problem.count
         history.append(cost)
-        state = {"vector": vector.tolist(), "evaluations": evaluations, "history": history}
-        _save_state(checkpoint, identity, state)
         report(len(history) / options.rounds, cost)
     return Found(vector, history[-1], evaluations, history)
 
@@ -229,31 +213,20 @@ def cma_es(
     seed: int,
     start: Array | None = None,
     shares: Sequence[Evaluate] = (),
-    about: Mapping[str, object] | None = None,
-    checkpoint: Path | None = None,
     report: Progress = lambda share, cost: None,
 ) -> Found:
     """Search from one start by CMA-ES.
 
     Costs only rank the candidates of a generation, so a share of the data is enough to judge it
     by. As shares take turns, the distribution's mean wanders about where all of them agree; its
-    averages and the last generations' best are judged by everything, and the best one counts. A
-    resumed run draws the same generations from the same seed and takes their costs from the
-    checkpoint, so it ends bit for bit as if never killed.
+    averages and the last generations' best are judged by everything, and the best one counts.
 
     Each generation is judged by the next of ``shares``, whose sum is ``values``, or by ``values``
-    itself; start and ``about`` are those of ``least_squares``. Progress reports what the
-    generation's share makes of the best cost.
-
-    Raises:
-        UsageError: The checkpoint belongs to another search.
+    itself. Progress reports what the generation's share makes of the best cost.
     """
     options = options or CmaOptions()
     low, high = parameters.bounds
     first = np.clip(np.zeros(len(low)) if start is None else start, low, high)
-    identity = {**_identity(parameters, first, options, about), "seed": seed}
-    saved = _load_state(checkpoint, identity) or {"costs": []}
-    costs: list[list[float]] = saved["costs"]
     bounds = [low.tolist(), high.tolist()]
     strategy = cma_strategy.seeded_strategy(first, options.spread, bounds, options.population, seed)
     judges = [*shares] or [values]
@@ -262,10 +235,7 @@ def cma_es(
     history: list[float] = []
     for generation in range(options.generations):
         vectors = np.array(strategy.ask())
-        if generation == len(costs):
-            costs.append(judges[generation % len(judges)](vectors).tolist())
-            _save_state(checkpoint, identity, {"costs": costs})
-        found = np.array(costs[generation])
+        found = judges[generation % len(judges)](vectors)
         strategy.tell(list(vectors), found.tolist())
         means.append(np.array(strategy.result.xfavorite))
         least = len(judges) * float(found.min())
@@ -285,37 +255,3 @@ def cma_es(
     final = values(elected)
     least = float(final.min())
     return Found(elected[final.argmin()], least, count + len(elected), [*history, least])
-
-
-def _identity(
-    parameters: ParameterSet, start: Array, options: object, about: Mapping[str, object] | None
-) -> dict[str, Any]:
-    return {
-        "parameters": repr(parameters.parameters),
-        "start": start.tolist(),
-        "options": repr(options),
-        "about": dict(about or {}),
-    }
-
-
-def _save_state(path: Path | None, identity: dict[str, Any], state: dict[str, Any]) -> None:
-    """Write what a search needs to go on, floats with every bit; nothing without a path."""
-    if path is not None:
-        io.write_atomically(path, json.dumps({"identity": identity, "state": state}).encode())
-
-
-def _load_state(path: Path | None, identity: dict[str, Any]) -> dict[str, Any] | None:
-    if path is None or not path.exists():
-        return None
-    try:
-        saved = json.loads(path.read_bytes())
-        known, state = saved["identity"], saved["state"]
-    except (ValueError, KeyError, TypeError, OSError) as error:
-        sentence = f"{path} is no checkpoint of a search; remove it to start anew."
-        raise errors.UsageError(sentence) from error
-    if known != json.loads(json.dumps(identity)):
-        raise errors.UsageError(
-            f"{path} belongs to a search with other parameters, data or options;"
-            " repeat those, or remove it to start anew."
-        )
-    return dict(state)

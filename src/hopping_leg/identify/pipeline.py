@@ -1,11 +1,7 @@
 """From recordings to identified parameters, judged on data that the fit has not seen."""
 
-import contextlib
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,16 +12,13 @@ from hopping_leg.identify.identifiability import Identifiability, identifiabilit
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import FitPlan, check_recordings, make_plan
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.result import Identified, as_json, software_versions
+from hopping_leg.identify.result import Identified
 from hopping_leg.identify.search import Pass, Report, Searcher, SearchOptions
 from hopping_leg.identify.torque_balance import check_balance
 from hopping_leg.identify.windows import SHORTEST, cut, duration, hold_out
-from hopping_leg.io import write_json
-from hopping_leg.locks import FOLDER_LOCK, hold_folder
 from hopping_leg.robot import NO_MISMATCH, Robot, check_physics
 
 _CREEP = 0.02  # rad/s; intervals hold what friction that fades below it makes of the values
-_CONFIG, _RESULT = "config.json", "result.json"
 
 
 @dataclass(frozen=True)
@@ -53,20 +46,16 @@ def identify(
     *,
     validate: Sequence[Recording] = (),
     options: IdentifyOptions | None = None,
-    folder: Path | None = None,
-    resume: bool = False,
     seed: int = 0,
     report: Report = lambda stage, share, cost: None,
 ) -> Identified:
     """Identify a robot.
 
-    A run that was killed goes on from its last generation with ``resume`` and ends bit for bit as
-    if it had not been. A quarter of the recordings is held out, in stretches, unless others are
-    given to ``validate``; the robot's table [reality] is left out. The folder keeps checkpoints
-    and the result; None keeps none.
+    A quarter of the recordings is held out, in stretches, unless others are given to
+    ``validate``; the robot's table [reality] is left out.
 
     Raises:
-        UsageError: An option has no meaning, or another process works in the folder.
+        UsageError: An option has no meaning.
         RecordingError: A recording is another leg's, too short, or lacks what is needed.
         PhysicsError: The fit failed.
     """
@@ -97,41 +86,18 @@ def identify(
     objective = Objective(
         tuple(fit), tuple(windows), plan.parameters, plan.scoring, plan.timestep, options.threads
     )
-    about = {"fitted": [r.name for r in fit], "starts": options.effort.starts}
-    config = _config(objective, options, held, seed)
-    with _held(folder):
-        if folder is not None:
-            _prepare(folder, config, resume=resume)
-        searcher = Searcher(
-            plan, objective, options.effort, seed, folder, report, options.ray, about
-        )
-        passes = searcher.run([r.metadata.rig for r in recordings])
-        report("finding intervals", 1.0, passes[-1].found.cost)
-        try:
-            hypothesis, known = _conclude(objective, passes[-1], options)
-        except PhysicsError as error:
-            _finish(folder, {"failed": str(error)})
-            raise
-        report("judging", 1.0, passes[-1].found.cost)
-        effort = (plan.timestep, options.threads)
-        before, after = (validation.validate(held, h, *effort) for h in (plan.start, hypothesis))
-        rigs = dict.fromkeys(r.metadata.rig for r in held)
-        groups = {rig: [r for r in held if r.metadata.rig == rig] for rig in rigs if len(rigs) > 1}
-        by_rig = {k: validation.validate(group, hypothesis, *effort) for k, group in groups.items()}
-        parts = (tuple(passes), known, tuple(fit), tuple(held), split, after, before, by_rig, seed)
-        identified = Identified(hypothesis, plan.start, plan, *parts)
-        _finish(folder, as_json(identified))
-        return identified
-
-
-def _held(folder: Path | None) -> contextlib.AbstractContextManager[None]:
-    """Let no other process fit in the folder meanwhile."""
-    return contextlib.nullcontext() if folder is None else hold_folder(folder, UsageError)
-
-
-def _finish(folder: Path | None, result: dict[str, Any]) -> None:
-    if folder is not None:
-        write_json(folder / _RESULT, result)
+    searcher = Searcher(plan, objective, options.effort, seed, report, options.ray)
+    passes = searcher.run([r.metadata.rig for r in recordings])
+    report("finding intervals", 1.0, passes[-1].found.cost)
+    hypothesis, known = _conclude(objective, passes[-1], options)
+    report("judging", 1.0, passes[-1].found.cost)
+    effort = (plan.timestep, options.threads)
+    before, after = (validation.validate(held, h, *effort) for h in (plan.start, hypothesis))
+    rigs = dict.fromkeys(r.metadata.rig for r in held)
+    groups = {rig: [r for r in held if r.metadata.rig == rig] for rig in rigs if len(rigs) > 1}
+    by_rig = {k: validation.validate(group, hypothesis, *effort) for k, group in groups.items()}
+    parts = (tuple(passes), known, tuple(fit), tuple(held), split, after, before, by_rig, seed)
+    return Identified(hypothesis, plan.start, plan, *parts)
 
 
 def _file_bounds(robot: Robot) -> dict[str, tuple[float, float]]:
@@ -199,45 +165,3 @@ def _conclude(
         residuals, slopes = weights * residuals, weights[:, None] * slopes
         change = weights * change
     return hypothesis, identifiability(last.parameters, vector, residuals, slopes, change)
-
-
-def _config(
-    objective: Objective, options: IdentifyOptions, held: Sequence[Recording], seed: int
-) -> dict[str, Any]:
-    """Return what makes a run this run, as JSON values; threads and cluster change nothing."""
-    config = {
-        "recordings": [[r.name, r.digest] for r in objective.recordings],
-        "recordings_to_judge_by": [[r.name, r.digest] for r in held],
-        "robot": objective.parameters.base.robot.digest,
-        "parameters": [asdict(p) for p in objective.parameters.parameters],
-        "scoring": asdict(objective.scoring),
-        "windows": len(objective.windows),
-        "search": [options.search, asdict(options.effort)],
-        "seed": seed,
-        "software": software_versions(),
-    }
-    return dict(json.loads(json.dumps(config)))
-
-
-def _prepare(folder: Path, config: dict[str, Any], *, resume: bool) -> None:
-    """Let a folder's own run go on if unfinished or with ``resume``, else begin anew."""
-    file, result = folder / _CONFIG, folder / _RESULT
-    checkpoints = list(folder.glob("search-*.json"))
-    if not file.exists():
-        if any(path.name != FOLDER_LOCK for path in folder.iterdir()):
-            raise UsageError(f"{folder} is not empty and holds no run; give another folder.")
-    elif checkpoints and (resume or not result.exists()):
-        try:
-            stored = json.loads(file.read_bytes())
-            differences = [k for k, v in config.items() if stored.get(k) != v]
-        except (ValueError, AttributeError) as error:
-            raise UsageError(f"{file} is no run's; give another folder.") from error
-        if differences:
-            raise UsageError(
-                f"The run in {folder} began with another {differences[0].replace('_', ' ')}; go on"
-                " with what it began with, or give another --folder."
-            )
-        return
-    for path in (*checkpoints, result):
-        path.unlink(missing_ok=True)
-    write_json(file, config)

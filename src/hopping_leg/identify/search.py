@@ -1,4 +1,4 @@
-"""A plan's search carried out: every candidate with every window in one batch, on disk as it goes.
+"""A plan's search carried out: every candidate with every window in one batch.
 
 Cost is the sum of squared residuals throughout, as the objective's robust loss weighs it. The
 paper's search has two passes: "The parameters that can be roughly estimated during modeling, i.e.
@@ -10,7 +10,6 @@ armature parameters derived from the first pass."
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -69,13 +68,10 @@ class Searcher:
     """Cost of the plan's parameters; a pass with others gets its own."""
     options: SearchOptions
     seed: int = 0
-    folder: Path | None = None
     report: Report = lambda stage, share, cost: None
     ray: str | None = None
     """Address of a Ray cluster that simulates, ``local`` for one on this machine; None simulates
     here."""
-    about: Mapping[str, object] = field(default_factory=dict)
-    """What else makes this run this run."""
 
     def run(self, rigs: Sequence[recording_format.Rig]) -> list[Pass]:
         """Return the passes for recordings on rigs, in order; the last one's end is the result."""
@@ -96,24 +92,22 @@ class Searcher:
         """Search from every start and report within a share of the whole."""
         threads = self.objective.threads if self.ray is None else 1
         objective = replace(self.objective, parameters=parameters, threads=threads)
-        searched = self._search_of(objective, {**objective.about(), **self.about})
+        searched = self._search_of(objective)
         starts = self.options.starts
 
         def search(number: int, start: Array) -> Found:
             stage = name if starts == 1 else f"{name}, start {number + 1} of {starts}"
-            file = f"search-{name.replace(', ', '-')}-{number}.json"
 
             def progress(done: float, cost: float) -> None:
                 self.report(stage, begin + share * (number + done) / starts, cost)
 
-            checkpoint = None if self.folder is None else self.folder / file
-            return searched(start=start, checkpoint=checkpoint, report=progress)
+            return searched(start=start, report=progress)
 
         ends = optimizers.multi_start(search, parameters, starts, self.seed)
         return Pass(name, parameters, ends[0], tuple(end.cost for end in ends[1:]))
 
-    def _search_of(self, objective: Objective, about: Mapping[str, object]) -> Callable[..., Found]:
-        """Return the plan's search, which still takes start, checkpoint and report."""
+    def _search_of(self, objective: Objective) -> Callable[..., Found]:
+        """Return the plan's search, which still takes start and report."""
         if self.plan.search == "least-squares":
             return partial(
                 optimizers.least_squares,
@@ -122,7 +116,6 @@ class Searcher:
                 self.options.least_squares,
                 loss=objective.loss,
                 groups=objective.jumping,
-                about=about,
             )
         rates = [r.metadata.rate_hz for r in objective.recordings]
         simulated = sum(w.length / rates[w.recording] for w in objective.windows)
@@ -136,7 +129,6 @@ class Searcher:
             self.options.cma,
             seed=self.seed,
             shares=[self._spread(replace(objective, windows=hand)) for hand in hands],
-            about=about,
         )
 
     def _spread(self, evaluate: Evaluate) -> Evaluate:
