@@ -31,7 +31,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from hopping_leg.cli.options import at_least, say, say_next, show_table
-from hopping_leg.controllers.registry import ENERGY_SHAPING, robot_of, shipped_policies
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode
 from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
 from hopping_leg.emulator.faults import KINDS, load_faults
@@ -52,8 +51,8 @@ class Emulate:
 
     robot: str = DEFAULT_ROBOT
     """A shipped robot or a .toml file; its [reality] stands behind the wire, too."""
-    start_pose: str = "stand"
-    """stand, crouch, stretch, zero (straight down), or joint angles as HIP,KNEE in rad."""
+    start_pose: tuple[str, ...] = ("stand",)
+    """stand, crouch, stretch, zero (straight down), or angles of hip and knee, rad."""
     faults: Path | None = None
     """TOML script of faults and their times."""
     interface: Literal["pty", "udp_multicast", "socketcan"] = "pty"
@@ -88,7 +87,7 @@ def run(args: Emulate) -> None:
 
     start = EmulatorConfig(
         robot=args.robot,
-        pose=args.start_pose,
+        pose=",".join(args.start_pose),
         configured=args.configured,
         homed=args.homed,
         held=args.held,
@@ -121,6 +120,8 @@ def run(args: Emulate) -> None:
 
 def _deployment(robot: str, port: str) -> list[str]:
     """Return the command that drives the leg, with a policy that is made for it, if any is."""
+    from hopping_leg.controllers.registry import ENERGY_SHAPING, robot_of, shipped_policies
+
     fitting = [name for name in shipped_policies() if robot_of([name]) == robot]
     name = "fast" if "fast" in fitting else [*fitting, ENERGY_SHAPING][0]
     return ["hop", "deploy", name, "--robot", robot, "--transport", port]

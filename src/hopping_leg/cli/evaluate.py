@@ -16,26 +16,22 @@ Examples:
   hop evaluate fast energy-shaping --suite robustness --axes payload delay
 """
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import tyro
 
-from hopping_leg import figure_style, io, progress
+from hopping_leg import io, progress
 from hopping_leg.cli import options
-from hopping_leg.controllers import RolloutConfig
-from hopping_leg.controllers.registry import robot_of
-from hopping_leg.evaluate import Entry, EvaluationRun, evaluate, figures, tables, trials
-from hopping_leg.evaluate.entries import load_entries
-from hopping_leg.evaluate.report import render_videos, write_report
-from hopping_leg.evaluate.result import ResultCache
-from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
-from hopping_leg.robot import TIMESTEP, SoftLimits, load_robot
-from hopping_leg.sim import CONTROL_RATE, NO_NOISE, NoiseAndDelay
+from hopping_leg.robot import CONTROL_RATE, TIMESTEP, SoftLimits, load_robot
 from hopping_leg.terminal import plain_console
+
+if TYPE_CHECKING:
+    from hopping_leg.controllers import RolloutConfig
+    from hopping_leg.evaluate import Entry, EvaluationRun
 
 
 @dataclass(frozen=True)
@@ -64,8 +60,13 @@ class Conditions:
     threads: int = 0
     """Threads of the physics, 0 for all cores; results do not depend on it."""
 
-    def load(self) -> tuple[list[Entry], RolloutConfig]:
+    def load(self) -> "tuple[list[Entry], RolloutConfig]":
         """Return the controllers and how they are rolled out; a wrong option is a UsageError."""
+        from hopping_leg.controllers import RolloutConfig
+        from hopping_leg.controllers.registry import robot_of
+        from hopping_leg.evaluate.entries import load_entries
+        from hopping_leg.sim import NO_NOISE, NoiseAndDelay
+
         options.at_least(0, seed=self.seed)
         robot = load_robot(self.robot or robot_of(self.controllers))
         noise = NoiseAndDelay() if self.noise else NO_NOISE
@@ -99,6 +100,9 @@ class Evaluate(Conditions):
 
 def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     """Evaluate controllers, print the table, write what was asked for; notes come first there."""
+    from hopping_leg.evaluate import tables, trials
+    from hopping_leg.evaluate.report import render_videos, write_report
+
     command = options.command_line("hop evaluate", args)
     if args.suite == "robustness":
         _judge_robustness(args, command)
@@ -125,7 +129,9 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     options.say_written(args.json, args.report, args.traces)
 
 
-def _judge(entries: list[Entry], setup: RolloutConfig, args: Evaluate) -> EvaluationRun:
+def _judge(entries: "list[Entry]", setup: "RolloutConfig", args: Evaluate) -> "EvaluationRun":
+    from hopping_leg.evaluate import evaluate, trials
+
     floors = ("soft", "stiff") if args.floor == "both" else (args.floor,)
     with progress.ShareProgress(parts=len(entries) * len(floors)) as bar:
         judged = [
@@ -137,7 +143,7 @@ def _judge(entries: list[Entry], setup: RolloutConfig, args: Evaluate) -> Evalua
                 seed=args.seed,
                 floor=floor,
                 kinds=trials.KINDS if floor == "soft" or args.floor != "both" else ("fixed",),
-                on_progress=functools.partial(bar.show, about=f", {floor} floor"),
+                on_progress=partial(bar.show, about=f", {floor} floor"),
             )
             for floor in floors
         ]
@@ -148,6 +154,11 @@ def _judge(entries: list[Entry], setup: RolloutConfig, args: Evaluate) -> Evalua
 
 def _judge_robustness(args: Evaluate, command: str) -> None:
     """Run the suite, print the scores, write numbers and figure."""
+    from hopping_leg import figure_style
+    from hopping_leg.evaluate import figures, tables
+    from hopping_leg.evaluate.result import ResultCache
+    from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
+
     entries, setup = args.load()
     out, heights, seeds = args.out or Path("runs/robustness"), args.commands, args.seeds
     suite = make_suite(setup, axes=args.axes, commands=heights, repeats=seeds, seed=args.seed)

@@ -9,17 +9,17 @@ Examples:
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
 import tyro
 
-from hopping_leg import errors, figure_style, io
+from hopping_leg import errors, io
 from hopping_leg.cli.options import say
-from hopping_leg.colours import controller_colours
-from hopping_leg.deploy.flight_recorder import SUFFIX, recover
-from hopping_leg.evaluate import aggregation, report, trials
-from hopping_leg.evaluate.video import Animation, fixed_traces, render_hops
 from hopping_leg.progress import said_if_slow
 from hopping_leg.robot import load_robot
+
+if TYPE_CHECKING:
+    from hopping_leg.evaluate import trials
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,11 @@ class Report:
     killed `hop deploy` leaves, whose trace is then written beside it."""
     out: Path = Path("figures")
     """Folder for the figures."""
-    format: figure_style.Format = "svg"
+    format: Literal["svg", "pdf", "png"] = "svg"
     """Kind of file."""
-    width: figure_style.Width = "screen"
+    width: Literal["screen", "column", "page"] = "screen"
     """Width of the figures: a screen, or a column (3.5 in) or page (7.16 in) of a paper."""
-    animation: Animation | None = None
+    animation: Literal["gif", "webp"] | None = None
     """Also render a hop at each command, side by side at half speed, one file per controller; needs
     OpenGL and traces of a shipped robot."""
 
@@ -47,6 +47,10 @@ def run(args: Report) -> None:
 
 
 def _draw(args: Report) -> None:
+    from hopping_leg import figure_style
+    from hopping_leg.colours import controller_colours
+    from hopping_leg.evaluate import aggregation, report, trials
+
     if not args.traces:
         raise errors.UsageError(
             "No trace was named; record some with `hop evaluate ... --traces DIR`."
@@ -66,7 +70,11 @@ def _draw(args: Report) -> None:
             say(f"Hops of {name}: {path}")
 
 
-def _animation(runs: Sequence[trials.Run], controller: str, colour: str, kind: Animation) -> bytes:
+def _animation(
+    runs: "Sequence[trials.Run]", controller: str, colour: str, kind: Literal["gif", "webp"]
+) -> bytes:
+    from hopping_leg.evaluate.video import fixed_traces, render_hops
+
     traces = fixed_traces(runs, controller)
     if not traces:
         raise errors.UsageError(
@@ -81,6 +89,8 @@ def _animation(runs: Sequence[trials.Run], controller: str, colour: str, kind: A
 
 
 def _trace(path: Path) -> Path:
+    from hopping_leg.deploy.flight_recorder import SUFFIX, recover
+
     if path.suffix != SUFFIX:
         return path
     trace = path.with_suffix(".parquet")

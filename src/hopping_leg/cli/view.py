@@ -24,7 +24,6 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from hopping_leg.cli.options import say
-from hopping_leg.controllers.registry import robot_of
 from hopping_leg.errors import UsageError
 
 if TYPE_CHECKING:
@@ -71,6 +70,8 @@ def run(args: View) -> None:
             f"--detail is {args.detail:g} but must lie above 0 and be at most {_MOST_DETAIL:g};"
             " 1 draws every pixel of the screen."
         )
+    from hopping_leg.controllers.registry import robot_of
+
     source = _source(args)
     from hopping_leg.viewer.viewer import Viewer
 
@@ -95,6 +96,7 @@ def run(args: View) -> None:
 
 def _source(args: View) -> "DataSource":
     """Return what is to be shown; whatever can be wrong with it is found here."""
+    from hopping_leg.controllers.registry import robot_of
     from hopping_leg.viewer.data_source import RecorderSource, ReplaySource
     from hopping_leg.viewer.live_leg import LiveSimulation
 

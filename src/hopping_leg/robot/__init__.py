@@ -10,6 +10,7 @@ from hopping_leg.robot.limits import (
 )
 from hopping_leg.robot.model import (
     COARSE_TIMESTEP,
+    CONTROL_RATE,
     GRAVITY,
     TIMESTEP,
     build_model,
@@ -42,6 +43,7 @@ from hopping_leg.robot.urdf import to_urdf
 
 __all__ = [
     "COARSE_TIMESTEP",
+    "CONTROL_RATE",
     "DEFAULT_ROBOT",
     "GRAVITY",
     "JOINTS",

@@ -6,11 +6,10 @@ import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import Robot, kinematics
+from hopping_leg.robot import CONTROL_RATE, Robot, kinematics
 from hopping_leg.sim.stepper import LOADS
 
-CONTROL_RATE = 200.0
-"""Control rate of the paper, Hz."""
+__all__ = ["CONTROL_RATE", "Simulator"]
 
 
 class Simulator(ABC):
