@@ -22,13 +22,13 @@ SHORTER = {
     "hop doctor --write": {"--yes": None},
     "hop emulate": {"--seconds": "0.3", "--no-realtime": None},
     "hop evaluate": {"--seeds": "1", "--commands": "0.3", "--floor": "soft", "--no-video": None},
-    "hop excite fixed-base": {
+    "hop record fixed-base": {
         "--amplitudes": "0.05", "--periods": "0.5", "--swings": "10", "--duration": "10",
     },
-    "hop excite moving-base": {"--amplitudes": "0.05", "--periods": "0.5", "--duration": "10"},
-    "hop excite multisine": {"--duration": "10"},
+    "hop record moving-base": {"--amplitudes": "0.05", "--periods": "0.5", "--duration": "10"},
+    "hop record multisine": {"--duration": "10"},
     "hop identify": {"--parameters": "hip.friction,knee.friction"},
-    "hop record --transport": {"--yes": None},
+    "hop record play --transport": {"--yes": None},
     "hop train": {"--steps": "1", "--heights": "0.28 0.32"},
     "hop train --recipe universal": {
         "--steps": "1", "--heights": "0.28 0.32", "--set": "num_envs=64 batch_size=1024",

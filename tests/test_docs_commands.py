@@ -40,7 +40,7 @@ WAIT = 600
 RUNNABLE = [page for page in PAGES if any(b.language in ("bash", "python") for b in blocks(page))]
 
 
-WITH_KINDS = ("excite", "export", "policies", "robots")
+WITH_KINDS = ("record", "export", "robots")
 """Verbs whose options depend on the next word."""
 
 

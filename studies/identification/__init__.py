@@ -1,9 +1,10 @@
 """How well and how fast are legs identified?"""
 
 RESULTS = (
-    "hop excite multisine --robot legv2 --centre 0.7 -1.4 --amplitude 0.3 0.4 --out "
+    "hop record multisine --robot legv2 --centre 0.7 -1.4 --amplitude 0.3 0.4 --out "
     "runs/results/multisine.parquet",
-    "hop record runs/results/multisine.parquet --robot twin --believed legv2 --out runs/results",
+    "hop record play runs/results/multisine.parquet --robot twin --believed legv2 "
+    "--out runs/results",
     "hop identify runs/results/twin-multisine.parquet --out runs/results/identified.toml "
     "--json studies/identification/results/identify.json",
     "python -m studies.identification --parts synthetic throughput mujoco-sysid --json "

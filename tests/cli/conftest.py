@@ -1,7 +1,6 @@
 import pytest
 
 from hopping_leg.cli import FAILED, main
-from hopping_leg.cli import evaluate as verb
 from hopping_leg.evaluate import Entry
 from tests.evaluate.conftest import Spring
 
@@ -13,7 +12,7 @@ def spring(monkeypatch):
     def load(names, robot, rate):
         return [Entry(name, Spring(robot), (0.29, 0.31)) for name in names]
 
-    monkeypatch.setattr(verb, "load_entries", load)
+    monkeypatch.setattr("hopping_leg.evaluate.entries.load_entries", load)
 
 
 @pytest.fixture

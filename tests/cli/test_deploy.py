@@ -114,7 +114,16 @@ def test_a_recording_from_motors_is_one_that_identification_takes(emulate, tmp_p
     emulate(robot="legv2", faults=(Fault("drop_reply", at=1.0, drive="hip"),))
     file, played = write_sine(tmp_path, rig, 400)
     position = played.position
-    words = ["record", str(file), "--transport", "/dev/leg", "--yes", "--out", str(tmp_path / "r")]
+    words = [
+        "record",
+        "play",
+        str(file),
+        "--transport",
+        "/dev/leg",
+        "--yes",
+        "--out",
+        str(tmp_path / "r"),
+    ]
     assert main(words) == 0
     recording = load_recording(tmp_path / "r" / "legv2-sine.parquet")
     assert recording.metadata.rig == rig
@@ -201,7 +210,7 @@ def test_a_wrong_option_or_transport_is_one_sentence(refused, words, sentence):
 def test_a_recording_holds_what_was_played_and_measured(tmp_path, rig):
     file, played = write_sine(tmp_path, rig, 300)
     out = tmp_path / "out"
-    words = ["record", str(file), "--robot", "twin", "--stiffness", "25", "15", "--out"]
+    words = ["record", "play", str(file), "--robot", "twin", "--stiffness", "25", "15", "--out"]
     assert main([*words, str(out)]) == 0
     assert main([*words, str(tmp_path / "again")]) == 0
     assert main([*words, str(tmp_path / "other"), "--seed", "5"]) == 0
@@ -237,7 +246,7 @@ def test_wrong_input_is_one_sentence(tmp_path, refused):
         ([str(file), "--seed", "-1"], "--seed is -1"),
         ([str(file), "--damping", "-1", "0"], "must be zero or more"),
     ):
-        refused(["record", *words, "--out", tmp_path / "out"], sentence)
+        refused(["record", "play", *words, "--out", tmp_path / "out"], sentence)
     assert not (tmp_path / "out").exists()
 
 
@@ -251,7 +260,7 @@ def test_wrong_input_is_one_sentence(tmp_path, refused):
 )
 def test_each_template_is_written_and_summed_up(tmp_path, words, rig, samples):
     out, facts = tmp_path / "excitation.parquet", tmp_path / "facts.json"
-    assert main(["excite", *words, "--out", str(out), "--json", str(facts)]) == 0
+    assert main(["record", *words, "--out", str(out), "--json", str(facts)]) == 0
     excitation = load_excitation(out)
     assert (excitation.rig, len(excitation)) == (rig, samples)
     told = json.loads(facts.read_text())
@@ -261,5 +270,5 @@ def test_each_template_is_written_and_summed_up(tmp_path, words, rig, samples):
 
 def test_what_the_leg_cannot_do_is_not_written(tmp_path, refused):
     out = tmp_path / "excitation.parquet"
-    refused(["excite", "fixed-base", "--no-adapt", "--out", out], "cannot follow the trajectory")
+    refused(["record", "fixed-base", "--no-adapt", "--out", out], "cannot follow the trajectory")
     assert not out.exists()

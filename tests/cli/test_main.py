@@ -70,8 +70,8 @@ def test_help_is_quick_and_loads_no_simulator():
         (["robot"], "Did you mean 'robots'?"),
         (["robots", "show", "legv3"], "There is no robot 'legv3'."),
         (["robots", "check", "missing.toml"], "There is no robot file missing.toml"),
-        (["policies", "show", "nobody"], "There is no controller 'nobody'."),
-        (["policies", "show", "LICENSE"], "not a policy file"),
+        (["export", "policy", "nobody"], "There is no controller 'nobody'."),
+        (["export", "policy", "LICENSE"], "not a policy file"),
         (["export", "urdf", "--out", "/dev/full"], "No space left on device"),
     ],
 )
@@ -256,7 +256,7 @@ def hop(words, folder, **environment):
 def test_what_a_terminal_cannot_encode_is_replaced(tmp_path, encoding):
     folder = tmp_path / "\u03c4"
     folder.mkdir()
-    words = ["policies", "show", "fast", "--out", str(folder / "fast.onnx")]
+    words = ["export", "policy", "fast", "--out", str(folder / "fast.onnx")]
     done = hop(words, tmp_path, PYTHONIOENCODING=encoding)
     assert done.returncode == 0, done.stderr
     assert f"Wrote {tmp_path}/?/fast.onnx" in done.stdout.decode(encoding)
@@ -265,7 +265,7 @@ def test_what_a_terminal_cannot_encode_is_replaced(tmp_path, encoding):
 
 @pytest.mark.parametrize("name", ["MUJOCO_GL", "MPLBACKEND"])
 def test_a_variable_that_a_library_refuses_is_named(tmp_path, name):
-    done = hop(["evaluate", "--help"], tmp_path, **{name: "nowhere"})
+    done = hop(["evaluate", "energy-shaping", "--commands", "9"], tmp_path, **{name: "nowhere"})
     assert done.returncode == 2
     assert (
         done.stderr.decode()
@@ -322,7 +322,7 @@ def test_places_for_results_are_tried_before_the_work(tmp_path, monkeypatch, opt
     assert not (tmp_path / "new").exists()
 
 
-@pytest.mark.parametrize("words", [["policies", "show", "fast"], ["robots", "list"]])
+@pytest.mark.parametrize("words", [["export", "policy", "fast"], ["robots", "list"]])
 def test_a_result_that_cannot_be_written_is_still_printed(capsys, words):
     assert main([*words, "--json", "/dev/full"]) == 2
     captured = capsys.readouterr()

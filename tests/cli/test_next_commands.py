@@ -75,7 +75,7 @@ def test_from_a_urdf_to_an_evaluation(run, monkeypatch):
 
 def test_from_an_excitation_to_an_identified_leg(run, monkeypatch):
     out = "an excitation.parquet"
-    (record,) = run("excite", "multisine", "--duration", "10", "--robot", ROBOT, "--out", out)
+    (record,) = run("record", "multisine", "--duration", "10", "--robot", ROBOT, "--out", out)
     (identify,) = run(*record[1:], "--out", "my recordings")
     check, train = run(*shortened(identify), "--out", "it's mine.toml")
     assert run(*check[1:]) == []

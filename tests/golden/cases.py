@@ -215,8 +215,8 @@ def _recorded(folder: Path, rig: str, robot: str, *words: object) -> Path:
     excitation = folder / f"{rig}.parquet"
     seconds = ["--duration", 8, "--amplitudes", 0.05, "--periods", 0.5]
     believed = "legv2" if robot == "twin" else robot
-    hop("excite", rig, "--robot", believed, *seconds, *words, "--out", excitation)
-    hop("record", excitation, "--robot", robot, "--out", folder / "recordings", "--seed", 2)
+    hop("record", rig, "--robot", believed, *seconds, *words, "--out", excitation)
+    hop("record", "play", excitation, "--robot", robot, "--out", folder / "recordings", "--seed", 2)
     (recording,) = (folder / "recordings").glob("*.parquet")
     return recording
 

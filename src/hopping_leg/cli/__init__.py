@@ -32,16 +32,14 @@ VERBS = {
     "robots": "list the legs, show every number, import or check your own",
     "evaluate": "run the paper's trials for controllers and write the report",
     "train": "train a controller from scratch, or go on after an interruption",
-    "excite": "write the trajectory that a leg is identified with",
-    "record": "play an excitation on a leg and record it",
+    "record": "write an excitation, play it on a leg and record it",
     "identify": "fit a leg to recordings and write its robot file",
     "deploy": "run a controller on the real leg, or on emulated drives",
     "emulate": "stand in for the real leg: two drives behind a real wire",
     "doctor": "say what is missing here; check, configure and home a leg's drives",
     "view": "watch the leg in the browser: live, a trace, or the real one",
     "report": "draw what stored traces show",
-    "export": "write a leg as URDF, traces as MCAP for Foxglove, rerun, ROS 2",
-    "policies": "list and inspect policies",
+    "export": "write a leg as URDF, a policy as ONNX, traces as MCAP",
     "reproduce": "the main job: record, identify, train, hop, evaluate, report",
 }
 """Every verb with its line in the overview."""
@@ -197,8 +195,9 @@ def _parts(word: str) -> list[str]:
 
 def _sentence(box: str) -> str:
     """Return what is wrong from the box that tyro prints: what stands above its inner line."""
-    inside = [line.strip("\u2502 ") for line in box.splitlines()[1:-1]]
-    above = itertools.takewhile(lambda line: line.strip("\u2500"), inside)
+    inside = [line.strip("\u2502| ") for line in box.splitlines()[1:]]
+    begun = itertools.dropwhile(lambda line: not line.strip("\u2500-"), inside)
+    above = itertools.takewhile(lambda line: line.strip("\u2500-\u2570\u256f"), begun)
     text = " ".join(line for line in above if line)
     near = re.search(r"Perhaps you meant:\s*(--[\w-]+)", "\n".join(inside))
     text = text if text.endswith((".", "!", "?")) else f"{text}."

@@ -7,7 +7,7 @@ until you call this again. Everything is recorded, also when the process is kill
 `hop report` reads the trace, or the flight recording that a killed run leaves behind.
 
 CONTROLLER is a name (fast, paper, energy-shaping), a policy (.onnx), a gain file (.toml), a Python
-class (path/to/file.py:Class), or a joint trajectory from `hop excite` (.parquet), which a joint PD
+class (path/to/file.py:Class), or a joint trajectory from `hop record` (.parquet), which a joint PD
 tracks.
 
 Examples:

@@ -1,17 +1,18 @@
-"""Write a leg as URDF, or traces in the files of other tools.
+"""Write a leg as URDF, a policy as ONNX, or traces as MCAP.
 
 Examples:
   hop export urdf --robot legv2 --out leg.urdf
+  hop export policy fast --out fast.onnx
   hop export traces runs/first/traces/*.parquet --out runs/mcap
 """
 
 import sys
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import tyro
 
-from hopping_leg.cli.options import RobotFile, say_written
+from hopping_leg.cli.options import JsonFile, RobotFile, save_json, say_written, show_table
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically
@@ -29,6 +30,17 @@ class Urdf:
 
 
 @dataclass(frozen=True)
+class Policy:
+    """Show what a policy says of itself and write it, e.g. `hop export policy fast`."""
+
+    policy: tyro.conf.Positional[str]
+    """A shipped name or the path of an .onnx file."""
+    out: Path | None = None
+    """Write the ONNX file here: raw joint measurements in, joint torques (N m) out."""
+    json: JsonFile = None
+
+
+@dataclass(frozen=True)
 class Traces:
     """Write traces as MCAP for Foxglove, rerun or ROS 2, a file for each."""
 
@@ -39,10 +51,12 @@ class Traces:
     """Folder to write to; default: beside the traces."""
 
 
-def run(args: Urdf | Traces) -> None:
-    """Export a leg or traces."""
+def run(args: Urdf | Policy | Traces) -> None:
+    """Export a leg, a policy or traces."""
     if isinstance(args, Traces):
         _export(args)
+    elif isinstance(args, Policy):
+        _show(args)
     elif args.out:
         write_atomically(args.out, to_urdf(load_robot(args.robot)).encode())
         say_written(args.out)
@@ -60,3 +74,15 @@ def _export(args: Traces) -> None:
         file = (args.out or path.parent) / f"{path.stem}.mcap"
         write_atomically(file, to_mcap(trace))
         say_written(file)
+
+
+def _show(args: Policy) -> None:
+    from hopping_leg.controllers.registry import load_policy
+
+    policy = load_policy(args.policy)
+    facts = {**asdict(policy.card), "digest": policy.digest, "inputs": policy.inputs}
+    show_table(("entry", "value"), facts.items(), f"policy {policy.name}")
+    save_json(args.json, facts)
+    if args.out:
+        write_atomically(args.out, policy.content)
+        say_written(args.out)

@@ -1,41 +1,109 @@
-"""Record a leg that tracks an excitation, for `hop identify`.
+"""Write an excitation, and record a leg that tracks it, for `hop identify`.
 
-The leg is simulated; one with a table [reality] plays the real one (see the shipped `twin`). The
-recordings do not give its parameters away: they are filed under the robot that it extends.
-
-With --transport it is the real leg, or `hop emulate`: its drives are checked as by `hop deploy`,
-the leg moves to the start of the excitation and plays it under the same joint PD.
+`fixed-base`, `moving-base` and `multisine` write the joints' targets, checked for reach, joint
+range, speed and torque. `play` tracks them on a leg. Without a transport the leg is simulated; one
+with a table [reality] plays the real one (see the shipped `twin`). The recordings do not give its
+parameters away: they are filed under the robot that it extends. With --transport it is the real
+leg, or `hop emulate`: its drives are checked as by `hop deploy`, the leg moves to the start of the
+excitation and plays it under the same joint PD.
 
 Examples:
-  hop record fixed-base.parquet moving-base.parquet --robot twin --out recordings
-  hop record fixed-base.parquet --robot my_twin.toml --believed legv2 --seed 3
-  hop record fixed-base.parquet --robot my_leg.toml --transport /dev/fdcanusb --out recordings
+  hop record fixed-base --robot legv2 --out fixed-base.parquet
+  hop record moving-base --robot legv2 --out moving-base.parquet
+  hop record multisine --centre 0.7 -1.4 --amplitude 0.3 0.4 --out multisine.parquet
+  hop record play fixed-base.parquet moving-base.parquet --robot twin --out recordings
+  hop record play fixed-base.parquet --robot my_leg.toml --transport /dev/fdcanusb
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 import tyro
 
 from hopping_leg.cli import motors, options
+from hopping_leg.cli.options import JsonFile, RobotFile, save_json, say, say_next, show_table
 from hopping_leg.controllers import command_schedule, joint_pd
 from hopping_leg.deploy import hardware_trials, keyboard, safety_limits, stop_reasons
 from hopping_leg.deploy.motion_sequence import MotionSequence, Poses, SequenceTiming, hopping_poses
 from hopping_leg.errors import HardwareError, UsageError
+from hopping_leg.identify import paper_excitation as paper
 from hopping_leg.identify import play_excitation, recording_format
-from hopping_leg.identify.excitation import Excitation, load_excitation
+from hopping_leg.identify.excitation import (
+    RATE,
+    Excitation,
+    HardwareRange,
+    Multisine,
+    Template,
+    demand,
+    load_excitation,
+    make_excitation,
+)
 from hopping_leg.progress import ShareProgress
 from hopping_leg.robot import TIMESTEP, Robot, load_robot, parent_robot
 
 
 @dataclass(frozen=True)
-class Record:
-    """What is played on which leg."""
+class Common:
+    """What every excitation needs."""
+
+    robot: RobotFile = "legv2"
+    out: Path = Path("excitation.parquet")
+    """Parquet file to write."""
+    json: JsonFile = None
+    rate: float = RATE
+    """Targets per second, Hz."""
+    track_velocity: bool = False
+    """Velocity targets are the positions' derivative, as in the lab's recordings, not zero."""
+    hip_range: recording_format.Pair = HardwareRange().hip
+    """Range of the real hip, rad."""
+    knee_range: recording_format.Pair = HardwareRange().knee
+    """Range of the real knee, rad."""
+
+
+@dataclass(frozen=True)
+class MovingBase(Common):
+    """The paper's moving-base trajectory: vertical strokes on the ground."""
+
+    amplitudes: tuple[float, ...] = paper.AMPLITUDES
+    """Amplitudes of the strokes, the paper's A, m."""
+    periods: tuple[float, ...] = paper.PERIODS
+    """Periods of the strokes, the paper's T1, s."""
+    duration: float = paper.DURATION
+    """Duration of all strokes together, s."""
+    margin: float = 0.0
+    """How far the leg stays from straight, m; 0 is the paper's text, 0.005 the lab's recordings."""
+    bend: paper.Bend = "backward"
+    """Side of the knee; the lab's fixed-base recordings bend forward."""
+    every_pair: bool = False
+    """Combine every amplitude with every period instead of the first with the first and so on."""
+    adapt: bool = True
+    """Shrink amplitudes that the leg cannot follow instead of refusing them."""
+
+
+@dataclass(frozen=True)
+class FixedBase(MovingBase):
+    """The paper's fixed-base trajectory: the foot strokes while the leg swings."""
+
+    swings: tuple[float, ...] = paper.SWINGS
+    """Periods of the swinging leg, the paper's T2, s."""
+
+
+@dataclass(frozen=True)
+class MultisineCommand(Common):
+    """Harmonics of hip and knee around a posture, base clamped."""
+
+    signal: Annotated[Multisine, tyro.conf.arg(name="")] = field(default_factory=Multisine)
+
+
+@dataclass(frozen=True)
+class Play:
+    """Play excitations on a leg and record it, e.g. `hop record play motion.parquet`."""
 
     excitations: tyro.conf.Positional[tuple[Path, ...]]
-    """Files from `hop excite`."""
+    """Files of the other kinds of `hop record`."""
     robot: str | None = None
     """A shipped robot or a .toml file; default twin, with --transport legv2."""
     transport: str | None = None
@@ -57,10 +125,81 @@ class Record:
     """Physics step, s."""
 
 
-def run(args: Record) -> None:
+def run(
+    args: FixedBase
+    | MovingBase
+    | Annotated[MultisineCommand, tyro.conf.subcommand(name="multisine")]
+    | Play,
+) -> None:
+    """Write an excitation, or play some and record."""
+    if isinstance(args, Play):
+        _play(args)
+    else:
+        _write(args)
+
+
+def _write(args: MovingBase | MultisineCommand) -> None:
+    """Write an excitation."""
+    robot = load_robot(args.robot)
+    limits = HardwareRange(args.hip_range, args.knee_range)
+    excitation = make_excitation(
+        _template(args, robot, limits),
+        robot,
+        rate=args.rate,
+        limits=limits,
+        track_velocity=args.track_velocity,
+    )
+    excitation.save(args.out)
+    facts = _facts(excitation, robot)
+    show_table(
+        ("", "hip", "knee"),
+        [(name, *(f"{x:.3g}" for x in pair)) for name, pair in facts["largest"].items()],
+        f"{args.out}: {len(excitation)} targets for {robot.name}",
+    )
+    say(*excitation.description.split("; "))
+    save_json(args.json, facts)
+    say_next(["hop", "record", "play", args.out, "--robot", args.robot])
+
+
+def _template(args: MovingBase | MultisineCommand, robot: Robot, limits: HardwareRange) -> Template:
+    if isinstance(args, MultisineCommand):
+        return args.signal
+    make = paper.moving_base
+    if isinstance(args, FixedBase):
+        make = partial(paper.fixed_base, swings=args.swings)
+    strokes = make(
+        args.amplitudes,
+        args.periods,
+        duration=args.duration,
+        margin=args.margin,
+        bend=args.bend,
+        every_pair=args.every_pair,
+    )
+    return paper.adapt(strokes, robot, rate=args.rate, limits=limits) if args.adapt else strokes
+
+
+def _facts(excitation: Excitation, robot: Robot) -> dict[str, Any]:
+    asked = demand(robot, excitation.rig, excitation.position, excitation.rate)
+    return {
+        "robot": robot.name,
+        "rig": excitation.rig,
+        "rate_hz": excitation.rate,
+        "samples": len(excitation),
+        "digest": excitation.digest,
+        "description": excitation.description,
+        "largest": {
+            "lower_rad": asked.position.min(axis=0).tolist(),
+            "upper_rad": asked.position.max(axis=0).tolist(),
+            "speed_rad_s": np.abs(asked.velocity).max(axis=0).tolist(),
+            "torque_nm": np.abs(asked.torque).max(axis=0).tolist(),
+        },
+    }
+
+
+def _play(args: Play) -> None:
     """Play every excitation and write its recording."""
     if not args.excitations:
-        raise UsageError("No excitation was given; write one with `hop excite`.")
+        raise UsageError("No excitation was given; write one with `hop record fixed-base`.")
     options.at_least(0, seed=args.seed)
     name = args.robot or ("twin" if args.transport is None else "legv2")
     robot = load_robot(name)
@@ -100,7 +239,7 @@ def run(args: Record) -> None:
 
 
 def _record_motors(
-    args: Record,
+    args: Play,
     transport: str,
     robot: Robot,
     excitations: list[tuple[str, Excitation]],

@@ -245,7 +245,7 @@ def load_excitation(path: Path) -> Excitation:
     facts = found if isinstance(found, dict) else {}
     known = all(isinstance(facts.get(name), str) for name in _WORDS)
     if not known or not is_number(rate := facts.get("rate_hz", 0)) or not rate > 0:
-        raise TraceError(f"{path} is no excitation; write one with `hop excite`.")
+        raise TraceError(f"{path} is no excitation; write one with `hop record`.")
     pairs = (PAIRS[f"{quantity}_command"] for quantity in ("position", "velocity"))
     position, velocity = (np.column_stack([trace.column(c) for c in pair]) for pair in pairs)
     return Excitation(trace.column("time_s"), position, velocity, *(facts[n] for n in _FACTS))
