@@ -70,7 +70,9 @@ class Recording:
 
     def segments(self) -> list[slice]:
         """Return the stretches of rows without a stall, in order."""
-        longest = unit_checks.STALL * unit_checks.row_period(self.time, self.metadata.period)
+        longest = recording_checks.STALL * recording_checks.row_period(
+            self.time, self.metadata.period
+        )
         stalls = np.flatnonzero(np.diff(self.time) > longest) + 1
         edges = [0, *stalls.tolist(), len(self)]
         return [slice(a, b) for a, b in pairwise(edges)]
