@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.report import parameter_table, quality_table, write_fit_report
-from hopping_leg.identify.report_figures import residual_spectrum, worst_stretch
+from hopping_leg.identify.report import (
+    parameter_table,
+    quality_table,
+    worst_stretch,
+    write_fit_report,
+)
 from hopping_leg.identify.result import as_json, save_robot
 from hopping_leg.identify.validation import overlays
 from hopping_leg.robot import check_physics, load_robot, load_tree
@@ -159,9 +163,9 @@ def test_the_page_holds_every_part_needs_nothing_and_is_the_same_again():
     page = write_fit_report(identified(), "hop identify")
     assert write_fit_report(identified(), "hop identify") == page
     page = page.decode()
-    for part in ("hip.friction", "Residual spectra", "Course of the cost", "Provenance", "swing"):
+    for part in ("hip.friction", "Provenance", "swing"):
         assert part in page
-    assert page.count("data:image/svg+xml") == 4
+    assert page.count("data:image/svg+xml") == 2
     assert "http" not in page.replace("http://www.w3.org", "")
 
 
@@ -199,16 +203,3 @@ def test_a_long_recording_is_drawn_where_it_fits_worst():
     rows = worst_stretch(overlay)
     assert rows.start > 300
     assert rows.stop - rows.start == pytest.approx(200, abs=1)
-
-
-def test_a_spectrum_shows_amplitude_where_the_error_is():
-    (overlay,) = drawn([run(1.0)])
-    wave = 0.02 * np.sin(2 * np.pi * 5.0 * overlay.recording.time)
-    position = overlay.simulated["position"][-1] + wave[:, None]
-    scattered = np.where(np.random.default_rng(0).random(position.shape) < 0.4, position, np.nan)
-    frequency, amplitude = residual_spectrum(
-        [dataclasses.replace(overlay, measured={"position": scattered})], "position", 0, -1
-    )
-    peak = amplitude.argmax()
-    assert frequency[peak] == pytest.approx(5.0, rel=0.05)
-    assert amplitude[peak] == pytest.approx(0.02, rel=0.2)

@@ -1,14 +1,16 @@
 """The report of an identification: one HTML page that holds everything and needs nothing."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
+from hopping_leg.arrays import Array
+from hopping_leg.figure_style import TORQUE_MAP, WIDTH, colour, styled
 from hopping_leg.html_page import Column, page_template, svg_uri, table
-from hopping_leg.identify import report_figures as figures
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json, warning
 from hopping_leg.identify.validation import RESTART, Overlay, overlays, rms
@@ -19,6 +21,8 @@ _CAD, _PAPER = "legv2", "legv2-paper"
 _UNITS = {"rad": ("mrad", 1e3), "N m": ("N m", 1.0)}
 """What is shown for an SI unit, and how many of them it is."""
 _MOST = 12  # recordings drawn, those that fit worst
+_SHOWN = 6.0  # longest stretch that is drawn, s
+_PANELS = [(quantity, joint) for quantity in ("position", "torque") for joint in (0, 1)]
 
 
 def write_fit_report(identified: Identified, command: str = "", threads: int = 0) -> bytes:
@@ -34,12 +38,10 @@ def write_fit_report(identified: Identified, command: str = "", threads: int = 0
         quality=quality_table(identified),
         parameters=parameter_table(identified),
         statements=known.statements,
-        correlations=svg_uri(figures.draw_correlations(known.names, known.correlation)),
+        correlations=svg_uri(draw_correlations(known.names, known.correlation)),
         recordings=recording_table(drawn),
         fits=[_fit(overlay) for overlay in _worst(drawn)],
         left_out=max(0, len(drawn) - _MOST),
-        spectra=svg_uri(figures.draw_spectra(drawn)),
-        course=svg_uri(figures.draw_course(identified.passes)),
         provenance=_provenance(as_json(identified)),
     )
     return page.encode()
@@ -121,7 +123,7 @@ def _fit(overlay: Overlay) -> dict[str, str]:
     return {
         "title": overlay.recording.name,
         "caption": f"{overlay.recording.metadata.source}; simulated {how}.",
-        "source": svg_uri(figures.draw_overlay(overlay)),
+        "source": svg_uri(draw_overlay(overlay)),
     }
 
 
@@ -152,6 +154,62 @@ def _provenance(tree: dict[str, Any]) -> dict[str, str]:
 
 def _scaled(key: str, row: dict[str, Any]) -> str:
     return _number(_UNITS[row["unit"]][1] * row[key])
+
+
+@styled
+def draw_overlay(overlay: Overlay) -> Figure:
+    """Draw measured and simulated positions and torques of the stretch that fits worst."""
+    rows = worst_stretch(overlay)
+    time = overlay.recording.time[rows]
+    figure = Figure(figsize=(WIDTH, 4.4), layout="constrained")
+    grid = figure.subplots(2, 2, sharex=True, squeeze=False)
+    for axes, (quantity, joint) in zip(grid.flat, _PANELS, strict=True):
+        axes.set_ylabel(
+            f"{JOINTS[joint]} {quantity} / {'rad' if quantity == 'position' else 'N m'}"
+        )
+        measured = overlay.measured[quantity][rows, joint]
+        before, after = overlay.simulated[quantity][:, rows, joint]
+        known = ~np.isnan(measured)
+        axes.plot(time[known], measured[known], ".", color="0.55", markersize=3.0, label="measured")
+        axes.plot(time, before, color=colour(4), linewidth=0.9, label="before")
+        axes.plot(time, after, color=colour(0), linewidth=1.1, label="after")
+        if known.any():  # what runs away before the fit is outside the picture
+            shown = np.concatenate([measured[known], after[np.isfinite(after)]])
+            low, high = shown.min(), shown.max()
+            room = 0.15 * (high - low) + 1e-6
+            axes.set_ylim(low - room, high + 1.6 * room)
+        axes.margins(x=0.01)
+    grid[0, 0].legend(loc="upper right", ncols=3)
+    for axes in grid[-1]:
+        axes.set_xlabel("time / s")
+    return figure
+
+
+def worst_stretch(overlay: Overlay) -> slice:
+    """Return the rows of the stretch with the largest position errors after the fit."""
+    time = overlay.recording.time
+    if time[-1] - time[0] <= _SHOWN:
+        return slice(0, len(time))
+    error = np.nansum(np.square(overlay.errors("position")[-1]), axis=-1)
+    stops = np.searchsorted(time, time + _SHOWN)
+    starts = np.flatnonzero(time <= time[-1] - _SHOWN)
+    total = np.concatenate([[0.0], np.cumsum(error)])
+    first = int(starts[np.argmax(total[stops[starts]] - total[starts])])
+    return slice(first, int(stops[first]))
+
+
+@styled
+def draw_correlations(names: Sequence[str], matrix: Array) -> Figure:
+    """Draw how the parameters' errors hang together; white is not at all."""
+    size = 1.8 + 0.3 * len(names)
+    figure = Figure(figsize=(min(WIDTH, size + 1.5), min(WIDTH, size)), layout="constrained")
+    axes = figure.subplots()
+    shown = axes.imshow(matrix, vmin=-1, vmax=1, cmap=TORQUE_MAP)
+    axes.set_xticks(range(len(names)), names, rotation=60, ha="right", rotation_mode="anchor")
+    axes.set_yticks(range(len(names)), names)
+    axes.grid(visible=False)
+    figure.colorbar(shown, ax=axes, shrink=0.8, label="correlation")
+    return figure
 
 
 def _number(value: float, digits: int = 3) -> str:
