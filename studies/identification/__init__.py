@@ -7,7 +7,7 @@ RESULTS = (
     "--out runs/results",
     "hop identify runs/results/twin-multisine.parquet --out runs/results/identified.toml "
     "--json studies/identification/results/identify.json",
-    "python -m studies.identification --parts synthetic throughput mujoco-sysid --json "
+    "python -m studies.identification --parts synthetic --json "
     "studies/identification/results/known_legs.json",
     "python -m studies.identification --parts coverage --json "
     "studies/identification/results/coverage.json",
@@ -15,20 +15,10 @@ RESULTS = (
     "studies/identification/results/paper_size.json",
     "python -m studies.identification --parts recordings --json "
     "studies/identification/results/recordings.json",
-    "python -m studies.identification --parts friction --json "
-    "studies/identification/results/friction.json",
 )
 
 TABLES = (
     ("table", "known_legs.json", "bars", "what", "bar", "measured", "unit", "reached"),
-    (
-        "table",
-        "known_legs.json",
-        "throughput.rows",
-        "what",
-        "s_per_candidate=s per candidate",
-        "times_faster=times faster",
-    ),
     ("table", "coverage.json", "bars", "what", "bar", "measured", "unit", "reached"),
     (
         "table",
@@ -40,15 +30,4 @@ TABLES = (
     ),
     ("table", "paper_size.json", "bars", "what", "bar", "measured", "unit", "reached"),
     ("table", "recordings.json", "bars", "what", "bar", "measured", "unit", "reached"),
-    ("table", "friction.json", "bars", "what", "bar", "measured", "unit", "reached"),
-    (
-        "table",
-        "friction.json",
-        "friction.rows",
-        "states",
-        "law",
-        "left_nm=left on held-out recordings, N m, rms",
-        "share=over today's",
-        "worst_share=worst recording and joint",
-    ),
 )

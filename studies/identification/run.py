@@ -1,47 +1,30 @@
 """All parts of the benchmark in one run, each kept, and what they say about the project's bars."""
 
-import contextlib
 import functools
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 
 from hopping_leg.cli.identify import FitProgress
 from hopping_leg.cli.options import at_least
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.identify.result import software_versions
-from hopping_leg.identify.search import Report
+from hopping_leg.robot.parameters import JOINTS
 from hopping_leg.terminal import plain_console
 from studies.identification.arm import coverage
-from studies.identification.bars import bars
-from studies.identification.fits import METHODS
-from studies.identification.friction import friction
-from studies.identification.mujoco_sysid import mujoco_sysid
+from studies.identification.known import FIXED, HOPPING, METHODS, RAIL, paper_size, synthetic
 from studies.identification.real import real
 from studies.identification.study import FitCache, Study
-from studies.identification.synthetic import paper_size, synthetic
-from studies.identification.throughput import throughput
 from studies.shared import host
 
-PARTS = (
-    "synthetic",
-    "throughput",
-    "coverage",
-    "mujoco-sysid",
-    "paper-size",
-    "recordings",
-    "friction",
-)
+PARTS = ("synthetic", "coverage", "paper-size", "recordings")
 """What can be measured, in order."""
-
 ARM_SECONDS = 12.0
 """Of each recording of an independent arm."""
-
 PAPER_METHODS = ("least-squares", "two-pass")
 """Searches on recordings of the paper's size."""
 
@@ -52,7 +35,7 @@ def bench_identify(
     *,
     parts: Sequence[str] = PARTS,
     recordings: Path | None = None,
-    on_repeat: Callable[[int, int], None] = lambda done, total: None,
+    on_arm: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
     """Measure identification.
 
@@ -61,7 +44,7 @@ def bench_identify(
         cache: Keeps each result.
         parts: Which of ``PARTS``.
         recordings: Folder with real recordings; None leaves them out.
-        on_repeat: Called with rounds of the timing, done and in all.
+        on_arm: Called with independent arms done and in all.
 
     Returns:
         An entry per part, and ``bars``: what was to be reached and what was.
@@ -76,29 +59,19 @@ def bench_identify(
         for name in given:
             if name not in known:
                 raise UsageError(unknown_name(kind, name, known))
-    if "least-squares" not in study.searches and {"synthetic", "mujoco-sysid"} & set(parts):
+    if "least-squares" not in study.searches and "synthetic" in parts:
         raise UsageError("Known twins are always identified by least squares, too; add it.")
     sizes = {field.name: getattr(study, field.name) for field in fields(Study)}
     result: dict[str, Any] = {"study": sizes, "host": host()}
-    if "synthetic" in parts or "mujoco-sysid" in parts:
+    if "synthetic" in parts:
         result["synthetic"] = synthetic(study, cache)
-    if "throughput" in parts:
-        result["throughput"] = cache.load_or_run(
-            "throughput",
-            "throughput: replay and plain loop in turn",
-            {**study.asked("cma", study.throughput_seconds), "repeats": study.repeats},
-            lambda: throughput(study, on_repeat),
-        )
     if "coverage" in parts:
         result["coverage"] = cache.load_or_run(
             "coverage",
             "independent arms",
             {"arms": study.arms, "seed": study.seed, "threads": study.threads},
-            lambda: coverage(study.arms, ARM_SECONDS, study.seed, study.threads, on_repeat),
+            lambda: coverage(study.arms, ARM_SECONDS, study.seed, study.threads, on_arm),
         )
-    if "mujoco-sysid" in parts:
-        result["mujoco_sysid"] = mujoco_sysid(study, cache, result["synthetic"]["rows"])
-        result["mujoco_sysid"]["side_by_side"] = _beside(result)
     if "paper-size" in parts:
         result["paper_size"] = {
             "rows": [
@@ -114,26 +87,77 @@ def bench_identify(
         }
     if "recordings" in parts and recordings is not None:
         result["recordings"] = real(study, cache, recordings)
-    if "friction" in parts and recordings is not None:
-        result["friction"] = friction(
-            recordings, study.seed, lambda stage: cache.report(stage, 0.0, 0.0)
-        )
     return {**result, "bars": bars(result), "versions": software_versions()}
 
 
-def _beside(result: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return our searches and mujoco.sysid's on the same data, in one list."""
-    others = result["mujoco_sysid"]["rows"]
-    cases = list(dict.fromkeys(row["case"] for row in others))
-    rows = [*result["synthetic"]["rows"], *others]
-    keys = ("case", "method", "fitted", "worst_error_percent", "wall_s", "cpu_s")
-    unseen = ("other_swings_rms_rad", "other_squats_rms_rad")
+Bar = tuple[str, float, str, float | None]
+"""In words, the bar, its unit, and the number."""
+
+
+def bars(result: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return a record per bar that was measured: what, the bar, the number, whether it is reached.
+
+    Args:
+        result: Of the benchmark, by part.
+    """
+    found = [*_known(result), *_real(result)]
+    if (arms := result.get("coverage")) is not None:
+        share, longest = 100 * arms["share_inside"], arms["fit_longest_s"]
+        found.append(("independent arms: 95 % intervals that hold the truth", 90.0, "%", share))
+        found.append(("independent arms, 12 s each: longest fit", 10.0, "s", longest))
+    for row in result.get("paper_size", {}).get("rows", []):
+        what = f"{row['recorded_s']:g} s of recordings: {row['method']}"
+        found.append((what, 90.0, "s", 60 * row["wall_minutes"]))
     return [
-        {key: row.get(key) for key in (*keys, *unseen)}
-        for case in cases
-        for row in rows
-        if row["case"] == case
+        {
+            "what": what,
+            "bar": bar,
+            "unit": unit,
+            "measured": value,
+            "reached": value is not None and (value >= bar if "hold" in what else value <= bar),
+        }
+        for what, bar, unit, value in found
     ]
+
+
+def _known(result: dict[str, Any]) -> list[Bar]:
+    every = result.get("synthetic", {}).get("rows", [])
+    rows = {row["case"]: row for row in every if row["method"] == METHODS["least-squares"]}
+    if not rows:
+        return []
+    fixed, rail, hops = rows[FIXED], rows[RAIL], rows[HOPPING]
+    error = fixed["worst_identifiable_error_percent"]
+    return [
+        ("known twin, fixed base: identifiable parameters", 0.5, "%", error),
+        ("known twin, fixed base: time", 10.0, "s", fixed["wall_s"]),
+        ("known twin: unseen swings", 1.0, "mrad", 1e3 * rail["other_swings_rms_rad"]),
+        ("known twin: unseen squats", 3.0, "mrad", 1e3 * rail["other_squats_rms_rad"]),
+        ("known twin: unseen hops", 10.0, "mrad", 1e3 * hops["other_hops_rms_rad"]),
+    ]
+
+
+def _real(result: dict[str, Any]) -> list[Bar]:
+    """Return bars of real recordings against the worst of all splits."""
+    arms, ahead = ("joint 1", "joint 2"), "double pendulum, {} s ahead, {}, worst split"
+    kinds: list[tuple[str, str, str, Sequence[str], str, float, tuple[float, float]]] = [
+        ("double", "predicted_0_2_s_rms_rad", ahead, arms, "mrad", 1e3, (12.0, 29.0)),
+        ("double", "predicted_0_5_s_rms_rad", ahead, arms, "mrad", 1e3, (33.0, 95.0)),
+    ]
+    leg = "leg V2, {}, {}, worst split"
+    kinds += [
+        ("leg V2", "closed_loop_position_rms_rad", leg, JOINTS, "mrad", 1e3, (25.0, 3.0)),
+        ("leg V2", "closed_loop_torque_rms_nm", leg, JOINTS, "N m", 1.0, (0.14, 0.4)),
+    ]
+    found: list[Bar] = []
+    for rig, key, what, names, unit, factor, pair in kinds:
+        every = result.get("recordings", {}).get("rows", [])
+        rows = [row[key] for row in every if row["rig"].startswith(rig)]
+        about = ".".join(key.split("_")[1:3]) if rig == "double" else key.split("_")[2]
+        for joint, (name, bar) in enumerate(zip(names, pair, strict=True)):
+            values = [row[joint] for row in rows if row[joint] is not None]
+            if values:
+                found.append((what.format(about, name), bar, unit, factor * max(values)))
+    return found
 
 
 _VARIABLE = "HOPPING_LEG_RECORDINGS"
@@ -141,14 +165,13 @@ _VARIABLE = "HOPPING_LEG_RECORDINGS"
 
 @dataclass(frozen=True)
 class Identify(Study):
-    """Identify known twins and real recordings; compare searches, mujoco.sysid and plain loops.
+    """Identify known twins, independent arms and real recordings; compare searches.
 
     Each result is kept; interrupted, the same command goes on with the next.
     """
 
     parts: tuple[str, ...] = ()
-    """Of synthetic, throughput, coverage, mujoco-sysid, paper-size, recordings and friction;
-    default: all."""
+    """Of synthetic, coverage, paper-size and recordings; default: all."""
     recordings: Path | None = None
     """Folder with real recordings; default: the environment's HOPPING_LEG_RECORDINGS, if set."""
     out: Path = Path("runs/bench-identify")
@@ -158,68 +181,28 @@ class Identify(Study):
 
     def measure(self) -> dict[str, Any]:
         """Run it, print what was to be reached and what was, return every number."""
-        at_least(1, generations=self.generations, repeats=self.repeats)
-        at_least(1, threads=self.threads, arms=self.arms)
+        at_least(1, generations=self.generations, threads=self.threads, arms=self.arms)
         at_least(4, population=self.population)
         at_least(0, seed=self.seed)
-        for name, least in (("seconds", 16), ("throughput_seconds", 12), ("paper_seconds", 12)):
+        for name, least in (("seconds", 16), ("paper_seconds", 12)):
             if not least <= getattr(self, name) <= 3600:
                 raise UsageError(
                     f"--{name.replace('_', '-')} is {getattr(self, name):g} but must lie between"
                     f" {least} and 3600."
                 )
-        console = plain_console()
-        with _Progress(console) as progress:
+        console, named = plain_console(), os.environ.get(_VARIABLE)
+        with FitProgress() as progress:
             result = bench_identify(
                 self,
-                FitCache(self.out, progress.begin, progress.report),
+                FitCache(self.out, lambda words: console.print(f"{words} ..."), progress.update),
                 parts=self.parts or PARTS,
-                recordings=self.recordings or _recordings(),
-                on_repeat=lambda done, total: console.print(f"{done} of {total}"),
+                recordings=self.recordings or (Path(named) if named else None),
+                on_arm=lambda done, total: progress.update("arms", done / total, 0.0),
             )
-        _print(console, result)
+        table = Table("what", "bar", "measured", "unit", "reached")
+        for row in result["bars"]:
+            measured = "-" if row["measured"] is None else f"{row['measured']:.3g}"
+            reached = "yes" if row["reached"] else "no"
+            table.add_row(row["what"], f"{row['bar']:g}", measured, row["unit"], reached)
+        console.print(table)
         return result
-
-
-class _Progress:
-    """One fit after the other, each with its own bar."""
-
-    def __init__(self, console: Console) -> None:
-        self._console, self._bar = console, contextlib.ExitStack()
-        self._update: Report = lambda stage, share, cost: None
-
-    def begin(self, words: str) -> None:
-        """End the last fit's bar and say what begins."""
-        self._bar.close()
-        self._console.print(f"{words} ...")
-        fit = self._bar.enter_context(FitProgress())
-        self._update = fit.update
-
-    def report(self, stage: str, share: float, cost: float) -> None:
-        """Show how the present fit goes."""
-        self._update(stage, share, cost)
-
-    def __enter__(self) -> Self:
-        """Begin without a fit."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """End the last fit's bar."""
-        self._bar.close()
-
-
-def _recordings() -> Path | None:
-    named = os.environ.get(_VARIABLE)
-    return Path(named) if named else None
-
-
-def _print(console: Console, result: dict[str, Any]) -> None:
-    table = Table("what", "bar", "measured", "unit", "reached")
-    for row in result["bars"]:
-        measured = "-" if row["measured"] is None else f"{row['measured']:.3g}"
-        reached = "yes" if row["reached"] else "no"
-        table.add_row(row["what"], f"{row['bar']:g}", measured, row["unit"], reached)
-    console.print(table)
-    missing = result.get("mujoco_sysid", {}).get("missing")
-    if missing:
-        console.print(missing)

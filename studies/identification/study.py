@@ -19,13 +19,9 @@ class Study:
     generations: int = 100
     """Of CMA-ES, in each pass."""
     population: int = 16
-    """Candidates of a generation, also where throughput is measured."""
-    repeats: int = 5
-    """Rounds of the throughput's timing."""
-    throughput_seconds: float = 240.0
-    """Of each recording that is timed; the paper's are of 240 s."""
+    """Candidates of a generation."""
     paper_seconds: float = 240.0
-    """Of each recording of the paper's size."""
+    """Of each recording of the paper's size; the paper's are of 240 s."""
     arms: int = 120
     """Independent arms whose truth intervals have to hold."""
     threads: int = 2

@@ -1,23 +1,15 @@
 import json
 
-import numpy as np
 import pytest
 
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import make_plan
-from hopping_leg.identify.simulate import WindowSimulator
-from hopping_leg.identify.windows import cut
 from hopping_leg.robot import COARSE_TIMESTEP, load_robot
-from studies.identification import friction, mujoco_sysid
-from studies.identification.bars import bars
-from studies.identification.fits import compare, summary
+from studies.identification.known import FIXED, compare, identify_twin, summary
 from studies.identification.real import real
-from studies.identification.run import Identify, bench_identify
+from studies.identification.run import Identify, bars, bench_identify
 from studies.identification.study import FitCache, Study
-from studies.identification.synthetic import FIXED, identify_twin
-from studies.identification.throughput import PlainLoop
-from studies.identification.twin import AIR, GROUND, record, twin
+from studies.identification.twin import AIR, record, twin
 from studies.shared import main
 
 
@@ -25,38 +17,6 @@ def test_twins_are_recorded_with_a_finer_step_than_fits_take():
     recording = record(AIR, "swings", 16.0)
     plan = make_plan([recording], load_robot("legv2"))
     assert recording.trace.header["timestep_s"] < plan.timestep == COARSE_TIMESTEP
-
-
-@pytest.mark.parametrize(("motion", "error"), [("swings", 3e-4), ("hops", 3e-3)])
-def test_plain_loop_and_replay_simulate_the_same(motion, error):
-    recordings = [record(GROUND, motion, 16.0)]
-    windows = cut(recordings, 0.25)[4::24]
-    candidate = LegHypothesis(load_robot("legv2"))
-    plain = np.stack(PlainLoop(recordings, windows, COARSE_TIMESTEP / 16).run(candidate))
-    replay = WindowSimulator(recordings, windows, timestep=COARSE_TIMESTEP, threads=1)
-    replayed = replay.run([candidate]).position[0]
-    np.testing.assert_allclose(plain, replayed, atol=error)
-    start = np.array([recordings[0].array("position")[w.start] for w in windows])
-    np.testing.assert_allclose(plain[:, 0], start, atol=1e-9)
-    assert np.ptp(plain, axis=1).max() > 0.2
-
-
-def test_a_law_of_friction_helps_where_it_is_the_truths_and_noise_helps_nothing():
-    rng = np.random.default_rng(0)
-    every = []
-    for _ in range(4):
-        plain, right, wrong = (rng.normal(size=(800, k)) for k in (3, 4, 64))
-        right[:400, 2:] = right[400:, :2] = 0.0
-        target = plain @ (1.0, 2.0, 3.0) + right @ np.ones(4) + 0.3 * rng.normal(size=800)
-        columns = dict.fromkeys(friction.LAWS, wrong) | {"Stribeck": right}
-        every.append(friction.Equations(plain, columns, target))
-    rows = {row["law"]: row for row in friction.judge(every)["rows"]}
-    assert rows["Stribeck"]["share"] < 0.3
-    assert rows["network"]["share"] == pytest.approx(1.0, abs=0.02)
-    result = {"friction": {"rows": [{"states": "smoothed", **row} for row in rows.values()]}}
-    (bar,) = bars(result)
-    assert bar["reached"]
-    assert bar["measured"] == rows["Stribeck"]["share"]
 
 
 def test_work_is_done_once(tmp_path):
@@ -75,16 +35,9 @@ def test_errors_are_relative_to_the_truth_and_claims_are_counted():
     assert summary(rows)["identifiable"] == 0
     told = summary(compare({"hip.friction": 0.111}, {"hip.friction": 0.11}, ["hip.friction"]))
     assert told["worst_identifiable_error_percent"] == pytest.approx(100 / 110)
-    assert summary(compare({"hip.friction": 0.1}, AIR, None))["identifiable"] is None
 
 
 def test_bars_know_which_side_is_better():
-    speed = {
-        "fixed_base_candidate_s": 0.05,
-        "paper_size_share": 0.25,
-        "replay_one_thread_over_loop": 50.0,
-        "replay_two_threads_over_one": 1.9,
-    }
     rows = [
         {
             "rig": "double pendulum",
@@ -97,9 +50,10 @@ def test_bars_know_which_side_is_better():
             "predicted_0_5_s_rms_rad": [0.034, None],
         },
     ]
-    found = bars({"throughput": speed, "recordings": {"rows": rows}})
-    assert [row["reached"] for row in found] == [False, True, True, True, False, False]
-    assert found[3]["measured"] == pytest.approx(11.0)
+    arms = {"share_inside": 0.95, "fit_longest_s": 12.0}
+    found = bars({"coverage": arms, "recordings": {"rows": rows}})
+    assert [row["reached"] for row in found] == [True, False, False, True, False]
+    assert found[0]["measured"] == pytest.approx(11.0)
 
 
 def test_bad_input_is_one_sentence(tmp_path):
@@ -111,54 +65,19 @@ def test_bad_input_is_one_sentence(tmp_path):
     assert main("identification", Identify, ["--seconds", "8"]) == 2
 
 
-def test_a_missing_extra_is_said(monkeypatch, tmp_path):
-    monkeypatch.setattr(mujoco_sysid, "available", lambda: False)
-    result = mujoco_sysid.mujoco_sysid(Study(), FitCache(tmp_path), [])
-    assert "hopping-leg[bench]" in result["missing"]
-    assert result["rows"] == []
-
-
-@pytest.mark.skipif(not mujoco_sysid.available(), reason="mujoco.sysid is not installed")
-@pytest.mark.parametrize(("way", "error"), [("windows", 5e-4), ("whole", 1.5e-3)])
-def test_the_truth_explains_the_data_to_mujoco_sysid(way, error):
-    from mujoco import sysid
-
-    from studies.identification.sequences import sequences
-
-    names, values = tuple(AIR), tuple(AIR.values())
-    cut_up = sequences(record(AIR, "swings", 16.0), way)
-    parameters = sysid.ParameterDict()
-    for name, value in AIR.items():
-        parameters.add(sysid.Parameter(name, value, 0, 1))
-
-    def largest(scale):
-        vector = scale * np.array(values)
-        parts = [
-            sysid.model_residual(
-                vector, parameters, lambda p: cut_up.build(names, tuple(p.as_vector())), t
-            )[0]
-            for t in cut_up.trajectories[:4]
-        ]
-        return np.abs(np.concatenate(parts)).max()
-
-    assert largest(1.0) < error
-    assert largest(2.0) > 3 * error
-
-
 @pytest.mark.slow
 def test_the_command_measures_keeps_and_goes_on(tmp_path):
     file = tmp_path / "identify.json"
-    words = ["--parts", "throughput", "--population", "4", "--repeats", "1"]
-    sizes = ["--throughput-seconds", "12", "--out", str(tmp_path / "kept"), "--json", str(file)]
-    assert main("identification", Identify, [*words, *sizes]) == 0
+    words = ["--parts", "paper-size", "--population", "4", "--generations", "2"]
+    words += ["--searches", "two-pass", "--paper-seconds", "16"]
+    places = ["--out", str(tmp_path / "kept"), "--json", str(file)]
+    assert main("identification", Identify, [*words, *places]) == 0
     first = json.loads(file.read_text())
-    speed = first["throughput"]
-    assert all(row["s_per_candidate"] > 0 for row in speed["rows"])
-    assert [row["bar"] for row in first["bars"]] == [0.15, 25.0, 1.8]
-    assert "--throughput-seconds 12" in first["command"]
+    assert [row["bar"] for row in first["bars"]] == [90.0]
+    assert "--paper-seconds 16" in first["command"]
     assert "--out" not in first["command"]
-    assert main("identification", Identify, [*words, *sizes]) == 0
-    assert json.loads(file.read_text())["throughput"] == speed
+    assert main("identification", Identify, [*words, *places]) == 0
+    assert json.loads(file.read_text())["paper_size"] == first["paper_size"]
 
 
 @pytest.mark.slow

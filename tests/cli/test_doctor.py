@@ -6,22 +6,22 @@ from tests.extras import TRAINING, run_without
 
 
 def test_what_is_missing_or_too_old_is_named_unless_for_another_platform():
-    lines = ["numpy>=1", "no-such-package>=2; extra == 'view'", "numpy>=999; extra == 'bench'"]
+    lines = ["numpy>=1", "no-such-package>=2; extra == 'view'", "numpy>=999; extra == 'cluster'"]
     lines.append("no-such-package; platform_machine == 'pdp11' and extra == 'pi3hat'")
     found = missing_requirements(lines)
     assert set(found) == set(PURPOSES)
     assert {extra: missing for extra, missing in found.items() if missing} == {
         "view": ["no-such-package>=2"],
-        "bench": ["numpy>=999"],
+        "cluster": ["numpy>=999"],
     }
 
 
 def test_an_extra_of_another_package_counts(monkeypatch):
     theirs = {"numpy": ["no-such-package; extra == 'fast'", "scipy; extra == 'good'"]}
     monkeypatch.setattr("hopping_leg.cli.doctor.requires", theirs.get)
-    lines = ["numpy[fast]>=1; extra == 'bench'", "numpy[good]; extra == 'view'"]
+    lines = ["numpy[fast]>=1; extra == 'cluster'", "numpy[good]; extra == 'view'"]
     found = missing_requirements(lines)
-    assert found["bench"] == ["numpy[fast]>=1"]
+    assert found["cluster"] == ["numpy[fast]>=1"]
     assert not found["view"]
 
 

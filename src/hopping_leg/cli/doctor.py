@@ -37,7 +37,6 @@ PURPOSES = {
     "hardware": "talk to the drives (hop deploy, hop doctor, hop emulate)",
     "pi3hat": "talk to the drives from a Raspberry Pi with a pi3hat",
     "ros": "MCAP files and ROS 2 bags (hop export traces, hop identify)",
-    "bench": "mujoco.sysid beside our fits (python -m studies.identification)",
     "cluster": "identify or train on a Ray cluster (--ray)",
     "docs": "build the documentation (make docs)",
     "dev": "test and check a clone (make test, make check)",

@@ -13,8 +13,6 @@ positive, the zeros z small, and g b / G2 is the length of the thigh; and with n
 joint may the same balance leave far less unexplained.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from hopping_leg.arrays import Array
@@ -40,11 +38,9 @@ class Balance:
     """The balance of a recording whose torques are commanded, solved for its numbers.
 
     ``values`` and their deviations ``errors`` are a, b, c, d, G cos z and -G sin z of hip and knee,
-    and friction, then torques that are always there, if ``biased``, and factors of ``further``:
-    torques at joints by number, known but for a factor, a value a row. ``unexplained`` is the
-    torques' share that is left. Signs are factors of each joint's angles and torques; ``upright``
-    takes both zeros for right, ``lever``, s2, b / G2 for known. ``design`` times all values is
-    ``target``.
+    and friction. ``unexplained`` is the torques' share that is left. Signs are factors of each
+    joint's angles and torques; ``upright`` takes both zeros for right, ``lever``, s2, b / G2 for
+    known.
     """
 
     def __init__(
@@ -54,9 +50,7 @@ class Balance:
         torques: tuple[int, int] = (1, 1),
         *,
         upright: bool = False,
-        biased: bool = False,
         lever: float = 0.0,
-        further: Sequence[tuple[int, Array]] = (),
     ) -> None:
         time, step = recording.time, np.diff(recording.time)
         (q1, q2), (w1, w2) = ((values * angles).T for values in full_states(recording))
@@ -90,12 +84,6 @@ class Balance:
                 column = [zero, zero]
                 column[joint] = mean(values, held=values is not drag and values is not speed)
                 pairs.append((column[0], column[1]))
-        always = mean(np.ones(len(time))) if biased else zero
-        pairs += [(always, zero), (zero, always)]
-        for joint, values in further:
-            column = [zero, zero]
-            column[joint] = mean(values)
-            pairs.append((column[0], column[1]))
         design = np.stack([np.concatenate(pair) for pair in pairs], axis=1)
         if upright:
             design[:, 6:8] = 0.0
@@ -116,7 +104,6 @@ class Balance:
         covariance = np.linalg.pinv(scaled.T @ scaled, hermitian=True)
         deviations = np.sqrt(np.maximum(np.diag(covariance), 0))
         self.errors = np.where(scaled.any(axis=0), deviations, np.inf)
-        self.design, self.target = design, target
 
 
 def check_balance(recording: Recording, robot: Robot) -> None:
