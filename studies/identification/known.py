@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.identify.optimizers import CmaOptions
+from hopping_leg.identify.optimizers import CmaOptions, Report, SearchOptions
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.search import Report, SearchOptions
 from hopping_leg.identify.validation import validate
 from hopping_leg.robot.model import COARSE_TIMESTEP
 from studies.identification.study import Clock, FitCache, Study

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from hopping_leg.evaluate.result import ResultCache
+from hopping_leg.identify.optimizers import Report
 from hopping_leg.identify.result import software_versions
-from hopping_leg.identify.search import Report
 
 
 @dataclass(frozen=True)

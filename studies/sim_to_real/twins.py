@@ -12,14 +12,13 @@ from typing import Any
 from hopping_leg import io, trace
 from hopping_leg.errors import UsageError
 from hopping_leg.identify import excitation, play_excitation
-from hopping_leg.identify.optimizers import LeastSquaresOptions
+from hopping_leg.identify.optimizers import LeastSquaresOptions, SearchOptions
 from hopping_leg.identify.paper_excitation import Strokes, adapt, fixed_base, moving_base
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import Recording, load_recording
 from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.result import Identified, as_json, save_robot
-from hopping_leg.identify.search import SearchOptions
 from hopping_leg.robot import NO_MISMATCH, Latency, Robot, load_robot, parent_robot, shipped_robots
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 from hopping_leg.sim.randomization import draw_twin

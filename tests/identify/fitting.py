@@ -2,10 +2,9 @@
 
 import functools
 
-from hopping_leg.identify.optimizers import CmaOptions, LeastSquaresOptions
+from hopping_leg.identify.optimizers import CmaOptions, LeastSquaresOptions, SearchOptions
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
-from hopping_leg.identify.search import SearchOptions
 from tests.identify.twin import LEG, record, swing
 
 TRUTH = {"hip.friction": 0.12, "knee.damping": 0.06}

@@ -4,12 +4,19 @@ import pickle
 import numpy as np
 import pytest
 
-from hopping_leg.identify import optimizers
 from hopping_leg.identify.cost import Scoring
-from hopping_leg.identify.optimizers import CmaOptions, Found, cma_es, jacobian, least_squares
+from hopping_leg.identify.optimizers import (
+    CmaOptions,
+    Found,
+    Searcher,
+    SearchOptions,
+    cma_es,
+    jacobian,
+    least_squares,
+    second_pass,
+)
 from hopping_leg.identify.parameters import choose
 from hopping_leg.identify.plan import make_plan, pass_names
-from hopping_leg.identify.search import Searcher, SearchOptions, second_pass
 from tests.identify.searches import BOTTOM, CAD, RUN, SCORING, TRUTH, TWO, bowl, objective
 from tests.identify.twin import LEG, noisy, record, swing
 
@@ -43,20 +50,6 @@ def test_shares_in_turn_find_the_bottom_of_their_sum():
     own = sum_of_shares(SHIFTS + BOTTOM)
     (least,) = sum_of_shares(BOTTOM[None])
     assert found.cost - least < 0.05 * (own.mean() - least)
-
-
-def test_many_starts_return_the_best_first():
-    low, high = TWO.bounds
-    seen = []
-
-    def search(number, start):
-        seen.append(start)
-        return optimizers.Found(start, float(np.sum(start**2)), 1, [])
-
-    found = optimizers.multi_start(search, TWO, 5, seed=0)
-    assert [f.cost for f in found] == sorted(f.cost for f in found)
-    assert all((low <= s).all() and (s <= high).all() for s in seen)
-    np.testing.assert_array_equal(seen[0], [0.0, 0.0])
 
 
 @pytest.mark.parametrize("groups", [None, np.arange(2)], ids=["one-sided", "two-sided"])
@@ -144,7 +137,7 @@ def test_shares_of_the_windows_find_more_in_the_same_time():
     for generations, seconds in ((5, np.inf), (20, 0.5)):
         options = SearchOptions(cma=CmaOptions(generations, 10, seconds=seconds))
         searcher = Searcher(plan, goal, options)
-        ends.append(searcher.run(["fixed-base"])[0].found)
+        ends.append(searcher.run()[0].found)
     whole, shared = ends
     assert shared.cost == goal(shared.vector[None])[0]
     assert shared.cost < 0.5 * whole.cost

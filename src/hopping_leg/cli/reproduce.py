@@ -29,11 +29,10 @@ from hopping_leg.evaluate import EvaluationRun, runner, tables
 from hopping_leg.evaluate.entries import entry_of
 from hopping_leg.evaluate.report import write_report
 from hopping_leg.identify import excitation, paper_excitation, play_excitation
-from hopping_leg.identify.optimizers import LeastSquaresOptions
+from hopping_leg.identify.optimizers import LeastSquaresOptions, SearchOptions
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import Recording, load_recording
 from hopping_leg.identify.result import save_robot
-from hopping_leg.identify.search import SearchOptions
 from hopping_leg.locks import hold_folder
 from hopping_leg.progress import ShareProgress
 from hopping_leg.robot import Robot, load_robot, parent_robot

@@ -9,11 +9,11 @@ from hopping_leg.errors import PhysicsError, RecordingError, RobotError, UsageEr
 from hopping_leg.identify import optimizers, validation
 from hopping_leg.identify.cost import Objective, Scoring
 from hopping_leg.identify.identifiability import Identifiability, identifiability
+from hopping_leg.identify.optimizers import Pass, Report, Searcher, SearchOptions
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import FitPlan, check_recordings, make_plan
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.result import Identified
-from hopping_leg.identify.search import Pass, Report, Searcher, SearchOptions
 from hopping_leg.identify.torque_balance import check_balance
 from hopping_leg.identify.windows import SHORTEST, cut, duration, hold_out
 from hopping_leg.robot import NO_MISMATCH, Robot, check_physics
@@ -87,7 +87,7 @@ def identify(
         tuple(fit), tuple(windows), plan.parameters, plan.scoring, plan.timestep, options.threads
     )
     searcher = Searcher(plan, objective, options.effort, seed, report, options.ray)
-    passes = searcher.run([r.metadata.rig for r in recordings])
+    passes = searcher.run()
     report("finding intervals", 1.0, passes[-1].found.cost)
     hypothesis, known = _conclude(objective, passes[-1], options)
     report("judging", 1.0, passes[-1].found.cost)

@@ -10,7 +10,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
-from hopping_leg.identify import recording_format, search
+from hopping_leg.identify import optimizers, recording_format
 from hopping_leg.identify.identifiability import Identifiability
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import FitPlan
@@ -34,7 +34,7 @@ class Identified:
     start: LegHypothesis
     """Robot and drives before the fit."""
     plan: FitPlan
-    passes: tuple[search.Pass, ...]
+    passes: tuple[optimizers.Pass, ...]
     """Searches in order; the last one's end is the result."""
     identifiability: Identifiability
     fit: tuple[Recording, ...]
