@@ -1,6 +1,5 @@
 """How far a simulation is from a recording: the paper's J, and what the data call for beyond it."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -180,19 +179,6 @@ class Objective:
             return raw
         squares = 2 * bound**2 * (np.sqrt(1 + np.square(raw / bound)) - 1)
         return np.asarray(np.copysign(np.sqrt(squares), raw))
-
-    def deviations(self, noise: Mapping[str, Array]) -> Array:
-        """Return what sensors' noise, by quantity in its unit, makes of residuals, (size,)."""
-        parts = [
-            np.broadcast_to(noise[name] / scale, mask.shape)[mask]
-            for name, (scale, _, mask) in self._scored.items()
-        ]
-        return np.concatenate(parts)
-
-    @property
-    def window_numbers(self) -> IntArray:
-        """Number of each residual's window, (size,)."""
-        return np.concatenate([np.nonzero(mask)[0] for _, _, mask in self._scored.values()])
 
     def __call__(self, vectors: Array) -> Array:
         """Return the costs of search vectors (n, k), by default the paper's J, (n,)."""
