@@ -8,23 +8,23 @@ ROOT = Path(__file__).parents[1]
 
 CEILINGS = {
     "src/hopping_leg/*.py": (14, 1450),
-    "src/hopping_leg/cli/**/*.py": (17, 2570),
+    "src/hopping_leg/cli/**/*.py": (17, 2560),
     "src/hopping_leg/controllers/**/*.py": (21, 3150),
-    "src/hopping_leg/deploy/**/*.py": (20, 3410),
-    "src/hopping_leg/emulator/**/*.py": (17, 2580),
+    "src/hopping_leg/deploy/**/*.py": (19, 3240),
+    "src/hopping_leg/emulator/**/*.py": (17, 2570),
     "src/hopping_leg/envs/**/*.py": (10, 1790),
-    "src/hopping_leg/evaluate/**/*.py": (18, 3160),
+    "src/hopping_leg/evaluate/**/*.py": (18, 3150),
     "src/hopping_leg/formats/**/*.py": (4, 330),
     "src/hopping_leg/identify/**/*.py": (24, 4980),
     "src/hopping_leg/rl/**/*.py": (26, 3440),
     "src/hopping_leg/robot/**/*.py": (20, 3100),
     "src/hopping_leg/sim/**/*.py": (13, 2540),
     "src/hopping_leg/viewer/**/*.py": (11, 1670),
-    "src/**/*.py": (215, 33980),
-    "tests/**/*.py": (153, 17890),
+    "src/**/*.py": (214, 33790),
+    "tests/**/*.py": (151, 17700),
     "studies/**/*.py": (99, 11310),
-    "docs/**/*.md": (38, 3360),
-    "docs/live/*.js": (13, 1510),
+    "docs/**/*.md": (38, 3350),
+    "docs/live/*.js": (13, 1500),
 }
 """Files and lines at most. Who raises one says what users gain by it."""
 

@@ -14,11 +14,8 @@ Examples:
   hop deploy fast --transport /dev/fdcanusb --command 0.30 --seconds 20
   hop deploy energy-shaping --transport socketcan:can0 --schedule 0.25:5,0.30:5,0.35:5
   hop deploy runs/mine/policy.onnx --transport /dev/pts/5 --live --yes
-  hop deploy fast --transport /dev/fdcanusb --seconds 60 --web 8000
 """
 
-import contextlib
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -26,8 +23,7 @@ import tyro
 
 from hopping_leg.cli import motors, options
 from hopping_leg.controllers import command_schedule, fallback, joint_pd, policy, protocol, registry
-from hopping_leg.deploy import hardware_trials, height_page, keyboard, safety_limits, stop_reasons
-from hopping_leg.deploy.loop import ControlLoop
+from hopping_leg.deploy import hardware_trials, keyboard, safety_limits, stop_reasons
 from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
 from hopping_leg.errors import HardwareError, PolicyError, TraceError, UsageError
 from hopping_leg.identify.excitation import load_excitation
@@ -55,8 +51,6 @@ class Deploy:
     """Time to hop, s; default 10, or as long as schedule or trajectory."""
     live: bool = False
     """Change the height while the leg hops: + and -, or the arrows."""
-    web: int | None = None
-    """Port of a page with a slider for the height and a stop button, 0 for any; implies --live."""
     soft_limits: bool = True
     """The paper's PD that pulls joints back into bounds."""
     other_robot: bool = False
@@ -150,11 +144,10 @@ def _perform(
     seconds: float,
 ) -> hardware_trials.Performance:
     height = None
-    if args.live or args.web is not None:
+    if args.live:
         height = keyboard.LiveHeight(
             schedule.at(0.0), command_schedule.command_range(controller, robot)
         )
-    page = None if args.web is None or height is None else height_page.HeightPage(height, args.web)
     poses = hopping_poses(robot)
     if isinstance(controller, joint_pd.JointPD):
         poses = replace(poses, start=controller.position[0])
@@ -164,17 +157,6 @@ def _perform(
     checked = None if isinstance(controller, joint_pd.JointPD) else robot
     sequence = MotionSequence(hops, height or schedule, poses, limiter, timing, checked=checked)
     limits = safety_limits.hopping_limits(robot, rate)
-
-    @contextlib.contextmanager
-    def beside(loop: ControlLoop) -> Iterator[None]:
-        with contextlib.ExitStack() as operator:
-            operator.enter_context(keyboard.keys(height, loop.stop, options.say))
-            if page is not None:
-                operator.enter_context(page.serve(loop.stop))
-            yield
-
-    if page is not None:
-        options.say(f"Height and stop: {page.address}")
     with motors.connect(robot, args.transport) as link:
         drives, name = motors.check(link, robot, limits), controller.name
         motors.ask(
@@ -186,5 +168,10 @@ def _perform(
             robot, controller, rate, transport=args.transport, drives=drives
         )
         return hardware_trials.perform(
-            link, sequence, limits, hardware_trials.new_path(args.out, name), header, beside=beside
+            link,
+            sequence,
+            limits,
+            hardware_trials.new_path(args.out, name),
+            header,
+            beside=lambda loop: keyboard.keys(height, loop.stop, options.say),
         )

@@ -1,7 +1,6 @@
 """The operator's keys: heights up and down; any other key, or the end of all input, stops."""
 
 import contextlib
-import math
 import os
 import re
 import select
@@ -25,22 +24,17 @@ class LiveHeight:
     """A height that the operator changes while the leg hops; ``valid`` is its range, m."""
 
     def __init__(self, height: float, valid: Range) -> None:
-        self._height, self.valid = height, valid
+        self._height, self._valid = height, valid
 
     def at(self, elapsed: float) -> float:
         """Return the height commanded now, m."""
         return self._height
 
-    def set(self, height: float) -> float:
-        """Command a height, brought into its range; return it, m. What is no number is left."""
-        low, high = self.valid
-        if not math.isnan(height):
-            self._height = round(min(max(height, low), high), 4)
-        return self._height
-
     def change(self, by: float) -> float:
         """Raise or lower the height, within its range; return it, m."""
-        return self.set(self._height + by)
+        low, high = self._valid
+        self._height = round(min(max(self._height + by, low), high), 4)
+        return self._height
 
 
 def handle_keys(data: bytes, height: LiveHeight | None, stop: Callable[[], None]) -> str:
