@@ -198,7 +198,6 @@ EMULATE, TRANSPORT = ["emulate", "--seconds", "0"], ["doctor", "--transport"]
         ([*TRANSPORT, "/none/port"], "There is no serial port /none/port"),
         ([*TRANSPORT, "usb"], "There is no transport 'usb'"),
         ([*TRANSPORT, "socketcn:can0"], "python-can has no interface 'socketcn'"),
-        ([*TRANSPORT, "pi3hat"], "moteus-pi3hat"),
         ([*TRANSPORT, "/dev/null"], "Cannot open the adapter"),
     ],
 )

@@ -7,7 +7,7 @@ from tests.extras import TRAINING, run_without
 
 def test_what_is_missing_or_too_old_is_named_unless_for_another_platform():
     lines = ["numpy>=1", "no-such-package>=2; extra == 'view'", "numpy>=999; extra == 'cluster'"]
-    lines.append("no-such-package; platform_machine == 'pdp11' and extra == 'pi3hat'")
+    lines.append("no-such-package; platform_machine == 'pdp11' and extra == 'hardware'")
     found = missing_requirements(lines)
     assert set(found) == set(PURPOSES)
     assert {extra: missing for extra, missing in found.items() if missing} == {

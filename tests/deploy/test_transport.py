@@ -1,6 +1,5 @@
-"""Adapters alone: what the port does not take, what asks for checksums, the pi3hat's event loop."""
+"""Adapters alone: what the port does not take, what asks for checksums."""
 
-import contextlib
 import os
 import time
 import tty
@@ -9,18 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hopping_leg.deploy.drive_link import LIMP, STOP
 from hopping_leg.deploy.fdcanusb import Fdcanusb
 from hopping_leg.deploy.frames import Frame, LineBuffer, split_checksum, with_checksum
-from hopping_leg.deploy.moteus_link import MoteusLink
-from hopping_leg.deploy.transport import Pi3hat
-from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.ports import LineProtocol
 from hopping_leg.errors import HardwareError
-from hopping_leg.robot import load_robot
-from tests.emulator.bench import Bench, MemoryTransport
 
-LEG = load_robot("legv2")
 WAIT = 2.0
 """Longest wait for replies, s: generous, as machines that run tests are slow."""
 
@@ -90,36 +82,3 @@ def test_an_adapter_that_asks_for_checksums_gets_them(terminal):
     assert [isinstance(item, Frame) for item in heard] == [False, False, True, False, True]
     assert port.trouble == "ERR checksum missing"
     port.close()
-
-
-def pi3hat(bench):
-    return MoteusLink(LEG, Pi3hat(lambda: [MemoryTransport(bench.robot)]))
-
-
-def test_the_pi3hat_carries_frames_and_waits_no_longer_than_it_may():
-    bench = Bench(faults=[Fault("drop_reply", drive="knee", since="start", at=0.1)])
-    with contextlib.closing(pi3hat(bench)) as link:
-        first = link.exchange(STOP, time.monotonic() + WAIT)
-        assert [reply.mode for reply in first.replies] == [0, 0]
-        bench.wait(0.101)
-        until = time.monotonic() + 0.2
-        hip, knee = link.exchange(LIMP, until).replies
-        assert hip is not None
-        assert knee is None
-        assert 0 <= time.monotonic() - until < WAIT
-        bench.wait(0.009)
-        assert bench.modes() == [10, 10]
-        answers = [link.ask(drive.make_query(), WAIT) for drive in link.controllers]
-        assert [answer.source for answer in answers] == [1, 2]
-        with pytest.raises(HardwareError, match="pi3hat is in use"):
-            pi3hat(bench)
-        assert not link.trouble
-
-
-def test_a_pi3hat_that_cannot_be_opened_says_why_and_may_be_opened_again():
-    def fail():
-        raise RuntimeError("no SPI")
-
-    with pytest.raises(HardwareError, match="Cannot open the adapter: no SPI"):
-        Pi3hat(fail)
-    pi3hat(Bench()).close()

@@ -35,7 +35,6 @@ PURPOSES = {
     "train": "train policies (hop train)",
     "view": "watch the leg in the browser (hop view)",
     "hardware": "talk to the drives (hop deploy, hop doctor, hop emulate)",
-    "pi3hat": "talk to the drives from a Raspberry Pi with a pi3hat",
     "ros": "MCAP files and ROS 2 bags (hop export traces, hop identify)",
     "cluster": "identify or train on a Ray cluster (--ray)",
     "docs": "build the documentation (make docs)",
@@ -48,8 +47,8 @@ class Doctor:
     """Which drives, and what may be changed."""
 
     transport: str | None = None
-    """Path of an fdcanusb, interface:channel of python-can, or pi3hat; without one the
-    installation is checked."""
+    """Path of an fdcanusb, or interface:channel of python-can; without one the installation is
+    checked."""
     robot: str = DEFAULT_ROBOT
     """A shipped robot or a .toml file; its table [hardware] says how the drives are wired."""
     write: bool = False

@@ -121,7 +121,7 @@ def opened(lock: locks.Lock, make: Callable[[], Any]) -> Any:  # noqa: ANN401
     """Return what is made; where that fails, give the lock back and raise ``HardwareError``."""
     try:
         return make()
-    except Exception as error:  # serial ports, python-can and the pi3hat raise many types
+    except Exception as error:  # serial ports and python-can raise many types
         lock.close()
         if isinstance(error, HardwareError):
             raise

@@ -1,21 +1,16 @@
-"""The adapters, for one host at a time: an fdcanusb, a bus of python-can, or a pi3hat.
+"""The adapters, for one host at a time: an fdcanusb, or a bus of python-can.
 
 None of them ever waits beyond the time that it is given, whatever the adapter does. The client
 library's own wait for a lost reply without bound, lose the healthy drive's reply when they are
 cancelled, and are silenced by a line of noise.
 """
 
-import argparse
-import asyncio
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import can
-import moteus
-from moteus.command import Command
-from moteus.transport_factory import get_transport_factories
 
 from hopping_leg import locks
 from hopping_leg.deploy.fdcanusb import Fdcanusb, opened
@@ -23,8 +18,8 @@ from hopping_leg.deploy.frames import Frame, padded
 from hopping_leg.errors import HardwareError, UsageError
 
 _FORMS = (
-    "the path of an fdcanusb (e.g. /dev/serial/by-id/...), interface:channel of python-can"
-    " (e.g. socketcan:can0), or pi3hat"
+    "the path of an fdcanusb (e.g. /dev/serial/by-id/...), or interface:channel of python-can"
+    " (e.g. socketcan:can0)"
 )
 
 
@@ -54,8 +49,6 @@ def open_transport(name: str) -> Transport:
         UsageError: It names no transport.
         HardwareError: It is in use, or cannot be opened.
     """
-    if name == "pi3hat":
-        return Pi3hat(_open_pi3hat)
     if "/" in name:
         if not Path(name).exists():
             raise UsageError(f"There is no serial port {name}; give {_FORMS}.")
@@ -131,86 +124,4 @@ def message_of(frame: Frame) -> can.Message:
         data=padded(frame.data),
         is_fd=True,
         bitrate_switch=True,
-    )
-
-
-_LONGEST_REPLY = 64  # bytes
-_SEND_SECONDS = 0.004  # A command that could not leave within this time is outdated
-_LEAST_SECONDS = 0.001  # In which what is asked leaves, also in a tick that began late
-
-
-class Pi3hat:
-    """The client library's own transport: its event loop runs only while something is asked of it.
-
-    Args:
-        make: Makes the library's devices.
-
-    Raises:
-        HardwareError: The hat is in use or cannot be opened.
-    """
-
-    def __init__(self, make: Callable[[], Any]) -> None:
-        self.trouble = ""
-        self._lock = locks.named_lock("host-pi3hat", "pi3hat", HardwareError)
-        self._transport = opened(self._lock, lambda: moteus.Transport(make()))
-        self._loop, self._asked = asyncio.new_event_loop(), list[Frame]()
-
-    def send(self, frames: Sequence[Frame]) -> None:
-        """Send frames; those that want a reply leave when it is received, as the hat needs it."""
-        self._asked = [frame for frame in frames if frame.wants_reply]
-        rest = [_command(frame, []) for frame in frames if not frame.wants_reply]
-        if rest:
-            self._run(self._transport.cycle(rest), _SEND_SECONDS)
-
-    def receive(self, until: float) -> list[Frame] | None:
-        """Return what arrives next."""
-        heard: list[Any] = []
-        asked, self._asked = [_command(frame, heard) for frame in self._asked], []
-        work = self._transport.cycle(asked) if asked else self._transport.read()
-        got = self._run(work, max(until - time.monotonic(), _LEAST_SECONDS))
-        if not asked and got is not None:
-            heard.append(got)
-        return [Frame(f.arbitration_id, bytes(f.data)) for f in heard] or None
-
-    def close(self) -> None:
-        """Close the hat."""
-        self._transport.close()
-        self._loop.close()
-        self._lock.close()
-
-    def _run(self, work: Any, seconds: float) -> Any:  # noqa: ANN401
-        """Return the result of work, None if it took too long or failed."""
-        try:
-            return self._loop.run_until_complete(asyncio.wait_for(work, seconds))
-        except TimeoutError:
-            return None
-        except Exception as error:  # the library raises many types
-            self.trouble = str(error)
-            return None
-
-
-def _command(frame: Frame, heard: list[Any]) -> Command:
-    """Return a frame as the library knows it; what answers it is appended to ``heard``."""
-    command = Command()
-    command.destination, command.source = frame.destination, frame.source
-    command.data, command.reply_required = frame.data, frame.wants_reply
-    command.expected_reply_size = _LONGEST_REPLY * frame.wants_reply
-
-    def hear(reply: Any) -> bool:  # noqa: ANN401
-        heard.append(reply)
-        return True
-
-    command.reply_filter = hear
-    return command
-
-
-def _open_pi3hat() -> Any:  # noqa: ANN401
-    for factory in get_transport_factories():
-        if factory.name == "pi3hat":
-            parser = argparse.ArgumentParser()
-            factory.add_args(parser)
-            return factory(parser.parse_args([]))
-    raise HardwareError(
-        "The pi3hat needs moteus-pi3hat, which exists for the Raspberry Pi alone:"
-        " pip install 'hopping-leg[pi3hat]'."
     )
