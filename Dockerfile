@@ -1,6 +1,6 @@
 # The README's installation in a container of Debian:
 #   docker build -t hopping-leg .
-#   docker run --rm -p 8080:8080 hopping-leg              (then open the printed address)
+#   docker run --rm --network host hopping-leg            (then open the printed address)
 #   docker run --rm -v "$PWD/runs:/hopping-leg/runs" hopping-leg evaluate fast --out runs/first
 FROM debian:bookworm-slim
 RUN apt-get update \
@@ -10,6 +10,5 @@ WORKDIR /hopping-leg
 COPY . .
 RUN make install
 ENV PATH="/hopping-leg/.venv/bin:$PATH"
-EXPOSE 8080
 ENTRYPOINT ["hop"]
-CMD ["demo", "--host", "0.0.0.0", "--no-browser"]
+CMD ["demo", "--no-browser"]

@@ -52,3 +52,16 @@ def page(browser):
         text for text in complaints if not text.startswith(_HARMLESS) and _ENDED not in text
     ] == []
     assert [url for url in far if not url.startswith(("data:", "blob:"))] == []
+
+
+@pytest.fixture
+def foreign(browser):
+    """A page of another site, also on this computer, so that the browser alone forbids nothing."""
+    from studies.speed.browser import new_page
+
+    site = "http://127.0.0.1:9999/"
+    page = new_page(browser)
+    page.route(f"{site}**", lambda route: route.fulfill(body="<p>", content_type="text/html"))
+    page.goto(site)
+    yield page
+    page.close()

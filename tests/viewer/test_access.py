@@ -4,7 +4,6 @@ import asyncio
 import http.client
 import itertools
 from types import SimpleNamespace
-from urllib.parse import quote
 
 import pytest
 
@@ -17,7 +16,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request
 
 from hopping_leg.errors import UsageError
-from hopping_leg.viewer.access import Access
+from hopping_leg.viewer.access import answer
 from hopping_leg.viewer.live_leg import LiveSimulation
 from hopping_leg.viewer.panels import GuiQueue, LivePanel, chosen, within
 from hopping_leg.viewer.viewer import Viewer
@@ -26,41 +25,24 @@ OWN = ("127.0.0.1:8080", "localhost:9000", "[::1]:1", "localhost")
 FOREIGN = ("elsewhere.example", "127.0.0.1.elsewhere.example:8080", "192.168.0.7:8080", "", "[")
 
 
-def request(host, origin=None, *, upgrade=False, path="/", cookie=""):
+def request(host, origin, *, upgrade):
     headers = Headers({"Host": host})
-    for name, value in (("Origin", origin), ("Cookie", cookie or None)):
-        if value is not None:
-            headers[name] = value
+    if origin is not None:
+        headers["Origin"] = origin
     if upgrade:
         headers["Upgrade"] = "websocket"
-    return Request(path, headers)
+    return Request("/", headers)
 
 
 @pytest.mark.parametrize("upgrade", [False, True])
 def test_this_computers_page_alone_is_served_and_only_to_itself(upgrade):
-    access = Access("127.0.0.1")
     for host, other in itertools.product(OWN + FOREIGN, (*OWN, *FOREIGN, None)):
         origin = None if other is None else f"http://{other}"
         served, asked = SimpleNamespace(headers=Headers()), request(host, origin, upgrade=upgrade)
-        answer = access.answer(lambda *_, served=served: served, None, asked)
+        answered = answer(lambda *_, served=served: served, None, asked)
         fits = host in OWN and (other == host or (other is None and not upgrade))
-        assert (answer is served) is fits, (host, origin)
-        assert answer.headers["X-Frame-Options"] == "DENY"
-
-
-@given(st.text(st.characters(max_codepoint=255, exclude_categories=["Cc"]), max_size=30))
-def test_other_computers_need_the_token_in_address_or_cookie(word):
-    access = Access("0.0.0.0")
-    assert len(access.token) > 16
-    for given_token, fits in ((word, False), (access.token, True)):
-        for asked in (
-            request("box:8080", path=f"/?token={quote(given_token)}"),
-            request("box:8080", cookie=f"other=1; hopping_leg={given_token}"),
-        ):
-            served = SimpleNamespace(headers=Headers())
-            answer = access.answer(lambda *_, served=served: served, None, asked)
-            assert (answer is served) is fits
-            assert (access.token in answer.headers.get("Set-Cookie", "")) is fits
+        assert (answered is served) is fits, (host, origin)
+        assert answered.headers["X-Frame-Options"] == "DENY"
 
 
 def test_the_served_page_and_its_websocket_are_guarded():
@@ -111,8 +93,8 @@ class Served:
     def __enter__(self):
         live = LiveSimulation(("energy-shaping",), "legv2-paper", 0.3)
         self.viewer = Viewer(live, "legv2-paper", port=0)
-        host, port = self.viewer.address.removeprefix("http://").split("/")[0].split(":")
-        return host.replace("localhost", "127.0.0.1"), int(port)
+        host, port = self.viewer.address.removeprefix("http://").split(":")
+        return host, int(port)
 
     def __exit__(self, *_):
         self.viewer.close()

@@ -21,10 +21,8 @@ BEST = "universal"
 class Demo:
     """Where the page is."""
 
-    host: str = view.View.host
-    """Address of this computer to serve at, as for `hop view`."""
     port: int = view.View.port
-    """Port to serve at; if it is in use, the next free one."""
+    """Port of this computer alone; if it is in use, the next free one."""
     browser: bool = True
     """Open the page where there is a screen."""
     seconds: float = float("inf")
@@ -34,8 +32,4 @@ class Demo:
 def run(args: Demo) -> None:
     """Serve the page until Ctrl-C."""
     shown = (BEST, ENERGY_SHAPING)
-    view.run(
-        view.View(
-            shown, None, host=args.host, port=args.port, browser=args.browser, seconds=args.seconds
-        )
-    )
+    view.run(view.View(shown, None, port=args.port, browser=args.browser, seconds=args.seconds))

@@ -3,8 +3,8 @@
 Without further words a live simulation: change height, controller, robot, payload, ground and
 delay while it hops, push it, pause, step, go slow; a second controller hops beside the first. With
 --trace it replays traces, simulated or from hardware; with --box it shows the real leg while
-`hop deploy` runs. It needs no screen on this computer: open the printed address anywhere it can be
-reached from, e.g. through `ssh -L 8080:localhost:8080`.
+`hop deploy` runs. It needs no screen on this computer: on another one, open the printed address
+through `ssh -L 8080:localhost:8080`.
 
 Examples:
   hop view
@@ -49,11 +49,8 @@ class View:
     """Traces to replay, one or two side by side."""
     box: Path | None = None
     """A flight recording to follow instead, or a folder whose newest one is followed."""
-    host: str = "127.0.0.1"
-    """Address of this computer to serve at; 0.0.0.0 lets everyone in the network look and steer who
-    has the address with its token."""
     port: int = 8080
-    """Port to serve at; if it is in use, the next free one."""
+    """Port of this computer alone; if it is in use, the next free one."""
     detail: float | None = None
     """Pixels drawn per pixel of the screen, each way; default: as many as the browser keeps up
     with."""
@@ -75,13 +72,8 @@ def run(args: View) -> None:
     source = _source(args)
     from hopping_leg.viewer.viewer import Viewer
 
-    viewer = Viewer(
-        source,
-        args.robot or robot_of(args.controllers),
-        host=args.host,
-        port=args.port,
-        detail=args.detail,
-    )
+    robot = args.robot or robot_of(args.controllers)
+    viewer = Viewer(source, robot, port=args.port, detail=args.detail)
     say(f"Open {viewer.address} in a browser; Ctrl-C stops.")
     screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if args.browser and (screen or sys.platform in ("win32", "darwin")):

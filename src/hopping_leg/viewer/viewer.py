@@ -4,9 +4,7 @@ import contextlib
 import html
 import io
 import math
-import socket
 import time
-import urllib.parse
 from importlib import resources
 
 import viser
@@ -17,6 +15,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.viewer import access, charts, data_source, live_leg, panels, playback_clock, scene
 
+_HOST = "127.0.0.1"
 FRAME_RATE = 60.0
 _SLOW = 6
 """Pictures per update of each plot and of the text; they take turns."""
@@ -33,13 +32,12 @@ class Viewer:
     Args:
         source: What is shown.
         robot: Name or file that a live simulation was started with.
-        host: Address of this computer to listen at.
         port: Port to listen at; if it is in use, the next free one.
         detail: Pixels that the page draws per pixel of the screen, each way; None lets it draw as
             many as it keeps up with.
 
     Raises:
-        UsageError: The page cannot be served there.
+        UsageError: There is no such port.
     """
 
     def __init__(
@@ -47,17 +45,14 @@ class Viewer:
         source: data_source.DataSource,
         robot: str = "",
         *,
-        host: str = "127.0.0.1",
         port: int = 8080,
         detail: float | None = None,
     ) -> None:
         self._source = source
-        self._server, token = _serve(host, port)
-        reached_at = "localhost" if host == "0.0.0.0" else host
-        self.address = f"http://{reached_at}:{self._server.get_port()}"
-        query = {"token": token, "fixedDpr": "" if detail is None else f"{detail:g}"}
-        if any(query.values()):
-            self.address += f"/?{urllib.parse.urlencode({k: v for k, v in query.items() if v})}"
+        self._server = _serve(port)
+        self.address = f"http://{_HOST}:{self._server.get_port()}"
+        if detail is not None:
+            self.address += f"/?fixedDpr={detail:g}"
         self.clock = playback_clock.PlaybackClock(1 / CONTROL_RATE)
         self._queue = panels.GuiQueue()
         gui = self._server.gui
@@ -161,20 +156,8 @@ def _send(client: viser.ClientHandle, message: _messages.Message) -> None:
     client._websock_connection.queue_message(message)
 
 
-def _serve(host: str, port: int) -> tuple[viser.ViserServer, str]:
-    """Return the server and the token that its address needs, or none."""
+def _serve(port: int) -> viser.ViserServer:
     if not 0 <= port < 65536:
         raise UsageError(f"--port is {port} but must lie between 0 and 65535.")
-    try:
-        # viser itself would try other ports without end.
-        socket.create_server((host, 0)).close()
-        who = access.Access(host)
-    except OSError as error:
-        raise UsageError(
-            f"The page cannot be served at {host} ({error}); --host must be an address of this"
-            " computer, e.g. 127.0.0.1."
-        ) from error
-    with contextlib.redirect_stdout(io.StringIO()), who.guarded():
-        server = viser.ViserServer(host=host, port=port, verbose=False)
-    assert who.installed, "this version of viser would serve everyone"
-    return server, who.token
+    with contextlib.redirect_stdout(io.StringIO()), access.guarded():
+        return viser.ViserServer(host=_HOST, port=port, verbose=False)
