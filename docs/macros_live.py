@@ -39,8 +39,7 @@ from hopping_leg.sim.channel import DELAY_DEPTH
 from hopping_leg.sim.leg_physics import ROWS
 from hopping_leg.sim.leg_table import LEG, leg_table
 from hopping_leg.sim.stepper import COMMAND, MEMORY
-from hopping_leg.viewer import live_settings
-from hopping_leg.viewer.live_leg import PUSH_SECONDS
+from hopping_leg.viewer import live_leg
 
 FOLDER = Path(__file__).parent / "live"
 MODULES = sorted(file.stem for file in FOLDER.glob("*.js"))
@@ -91,11 +90,11 @@ def data(policies: dict[str, str]) -> dict[str, Any]:
         "noise": dataclasses.asdict(NoiseAndDelay()),
         "soft_limits": dataclasses.asdict(SoftLimits()),
         "ranges": {
-            "payload": live_settings.PAYLOAD,
-            "ground": live_settings.TIME_CONSTANT,
-            "delay": live_settings.DELAY,
+            "payload": live_leg.PAYLOAD,
+            "ground": live_leg.TIME_CONSTANT,
+            "delay": live_leg.DELAY,
         },
-        "push_seconds": PUSH_SECONDS,
+        "push_seconds": live_leg.PUSH_SECONDS,
         "robot": DEFAULT_ROBOT,
         "robots": {name: of_robot(robot) for name, robot in legs.items()},
         "layouts": {

@@ -18,7 +18,7 @@ from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import TIMESTEP, load_robot, shipped_robots
 from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.leg_table import LEG, leg_table
-from hopping_leg.viewer.live_settings import LiveSettings
+from hopping_leg.viewer.live_leg import LiveSettings
 from tests.doc_pages import DOCS
 
 LEGS = [name for name in shipped_robots() if load_robot(name).kind == "leg"]

@@ -6,8 +6,7 @@ import pytest
 from hopping_leg.errors import PhysicsError, RobotError, UsageError
 from hopping_leg.robot import GroundMismatch, load_robot
 from hopping_leg.viewer import live_leg
-from hopping_leg.viewer.live_leg import LiveSimulation
-from hopping_leg.viewer.live_settings import LiveSettings, default_settings
+from hopping_leg.viewer.live_leg import LiveSettings, LiveSimulation, default_settings
 
 ROBOT = "legv2-paper"
 
@@ -127,8 +126,6 @@ def test_a_refused_wish_changes_nothing():
         live.set_robot("doublependulum")
     with pytest.raises(UsageError, match="one, or two"):
         live.set_controllers(("fast",) * 3)
-    with pytest.raises(UsageError, match="out of range"):
-        live.push(float("nan"))
     assert live.names == ("energy-shaping",)
     assert live.robot.name == ROBOT
     assert live.tracks is tracks
@@ -166,12 +163,6 @@ def test_an_unstable_leg_stands_up_again_and_says_so(monkeypatch):
     live.advance(0.3)
     assert "stands up again" in live.notices[0]
     assert np.isfinite(heights(live)).all()
-
-
-@pytest.mark.parametrize("wrong", [{"payload": -0.1}, {"delay": 1.0}, {"time_constant": 0.0}])
-def test_settings_out_of_range_is_refused(wrong):
-    with pytest.raises(UsageError, match="must lie between"):
-        LiveSettings(**({"time_constant": 0.05} | wrong))
 
 
 class Compiling:

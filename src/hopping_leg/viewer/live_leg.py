@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,10 +11,9 @@ from hopping_leg.controllers import command_schedule, protocol, registry
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.robot import Robot, SoftLimits, load_robot
-from hopping_leg.sim import CONTROL_RATE, LegSimulator, Plant, stepper
+from hopping_leg.sim import CONTROL_RATE, NO_NOISE, LegSimulator, NoiseAndDelay, Plant, stepper
 from hopping_leg.sim.compiled import FOLDER, say_compiling, was_compiled
 from hopping_leg.sim.mujoco_simulator import MujocoSimulator
-from hopping_leg.viewer.live_settings import PUSH, LiveSettings, default_settings
 from hopping_leg.viewer.tracks import FIELDS, Track
 
 MOST = 2
@@ -24,6 +24,52 @@ KEPT_SECONDS = 10.0
 
 PUSH_SECONDS = 0.05
 """How long a push lasts."""
+
+Range = command_schedule.Range
+
+PAYLOAD: Range = (0.0, 1.0)  # on the base, kg
+TIME_CONSTANT: Range = (0.005, 0.15)  # of the ground, from hard to soft, s
+DELAY: Range = (0.0, 0.03)  # of commands, beyond the robot's own, s
+PUSH: Range = (5.0, 60.0)  # N
+
+
+@dataclass(frozen=True)
+class LiveSettings:
+    """Ground, payload, delay and noise beside the robot file; the controller is not told."""
+
+    time_constant: float
+    """Time constant of the ground, s; small is hard."""
+    payload: float = 0.0
+    """Mass on the base, kg."""
+    delay: float = 0.0
+    """Delay of commands beyond the robot's own, s."""
+    noise: bool = True
+    """The paper's noise and random delay of measurements."""
+
+    @property
+    def noise_and_delay(self) -> NoiseAndDelay:
+        """Noise and delay of measurements and torques."""
+        return NoiseAndDelay() if self.noise else NO_NOISE
+
+    def apply(self, robot: Robot) -> Robot:
+        """Return the robot with these settings."""
+        latency, ground = robot.reality.latency, robot.reality.ground
+        if ground.time_constant is not None:
+            ground = replace(ground, time_constant=self.time_constant)
+        latency = replace(latency, command=latency.command + self.delay)
+        return replace(
+            robot,
+            base=replace(robot.base, mass=robot.base.mass + self.payload),
+            contact=replace(robot.contact, time_constant=self.time_constant),
+            reality=replace(robot.reality, ground=ground, latency=latency),
+        )
+
+
+def default_settings(robot: Robot) -> LiveSettings:
+    """Return the settings of the robot file, its ground clipped to what can be set."""
+    own = robot.reality.ground.time_constant or robot.contact.time_constant
+    low, high = TIME_CONSTANT
+    return LiveSettings(time_constant=min(max(own, low), high))
 
 
 def start_compiling() -> "subprocess.Popen[bytes] | None":
@@ -81,8 +127,7 @@ class LiveSimulation:
         """Let simulated time pass, in whole ticks."""
         if self._compiling is not None and self._compiling.poll() is not None:
             self._compiling, self._in_mujoco = None, False
-            for leg in self._legs:
-                leg.use_stepper(self.height)
+            self._go_on()
         for _ in range(round(seconds * CONTROL_RATE)):
             self.tick()
 
@@ -105,13 +150,7 @@ class LiveSimulation:
         return self.height
 
     def push(self, force: float) -> None:
-        """Push the bases up, or down with a negative force, N, for ``PUSH_SECONDS``.
-
-        Raises:
-            UsageError: The force is too large to mean anything.
-        """
-        if not abs(force) <= PUSH[1]:
-            raise UsageError(f"A push of {force:g} N is out of range; give up to {PUSH[1]:g} N.")
+        """Push the bases up, or down with a negative force, N, for ``PUSH_SECONDS``."""
         self._force = force
         self._push_ticks = round(PUSH_SECONDS * CONTROL_RATE)
 
@@ -124,8 +163,7 @@ class LiveSimulation:
         if self._in_mujoco and not settings.apply(self.robot).reality.neutral:
             raise UsageError("Delays can be set once the leg's physics is compiled, in seconds.")
         self.settings = settings
-        for leg in self._legs:
-            leg.set_settings(self.settings, self.height)
+        self._go_on()
 
     def stand(self) -> None:
         """Let all legs begin anew, standing."""
@@ -170,14 +208,18 @@ class LiveSimulation:
         self.names = names
         self._controllers: list[protocol.Controller] = loaded
         self.set_height(self.height)
-        neutral = self.settings.apply(robot).reality.neutral
-        self._in_mujoco = self._compiling is not None and neutral
-        self._legs: list[LiveLeg] = [
-            LiveLeg(c, robot, self.settings, self.height, self._seed, in_mujoco=self._in_mujoco)
-            for c in loaded
-        ]
+        changed = self.settings.apply(robot)
+        self._in_mujoco = self._compiling is not None and changed.reality.neutral
+        self._legs = [LiveLeg(c, changed, self._seed, in_mujoco=self._in_mujoco) for c in loaded]
+        self._go_on()
+        self.stand()
         depth = round(KEPT_SECONDS * CONTROL_RATE)
-        self.tracks: list[Track] = [Track(c.name, robot, depth=depth) for c in loaded]
+        self.tracks = [Track(c.name, robot, depth=depth) for c in loaded]
+
+    def _go_on(self) -> None:
+        changed, noise_and_delay = self.settings.apply(self.robot), self.settings.noise_and_delay
+        for leg in self._legs:
+            leg.go_on(changed, noise_and_delay, self.height, in_mujoco=self._in_mujoco)
 
 
 def _load(names: tuple[str, ...], robot: Robot) -> list[protocol.Controller]:
@@ -204,25 +246,16 @@ class LiveLeg:
     """A leg that hops under a controller that believes it to be as its file has it."""
 
     def __init__(
-        self,
-        controller: protocol.Controller,
-        robot: Robot,
-        settings: LiveSettings,
-        height: float,
-        seed: int,
-        *,
-        in_mujoco: bool = False,
+        self, controller: protocol.Controller, robot: Robot, seed: int, *, in_mujoco: bool
     ) -> None:
-        self.controller, self.robot, self.settings = controller, robot, settings
+        self.controller = controller
         self._rng = np.random.default_rng(seed)
-        self._force, self._in_mujoco = 0.0, in_mujoco
-        self._legs = self._simulator()
-        self._connect()
-        self.stand(height)
+        self._force = 0.0
+        self._legs = _simulator(robot, in_mujoco=in_mujoco)
 
     def stand(self, height: float) -> None:
         """Begin anew, standing; ``height`` is what is commanded, m."""
-        self._legs.stand(_ALL, RolloutConfig(self.robot).start_posture)
+        self._legs.stand(_ALL, RolloutConfig(self._legs.robot).start_posture)
         self._legs.push(np.zeros(1))
         self._force = 0.0
         self.set_controller(self.controller, height)
@@ -231,17 +264,22 @@ class LiveLeg:
         """Go on with another controller, or the same one anew, in the present state."""
         self.controller = controller
         controller.reset(1)
-        self._plant.channel.restart(_ALL, self._legs.q, self._legs.qd, np.array([height]))
+        self._restart(height)
 
-    def set_settings(self, settings: LiveSettings, height: float) -> None:
-        """Change the settings in the present state; the controller is not told."""
-        self.settings = settings
-        self._go_on(height)
-
-    def use_stepper(self, height: float) -> None:
-        """Let the stepper simulate from the present state on."""
-        self._in_mujoco = False
-        self._go_on(height)
+    def go_on(
+        self, robot: Robot, noise_and_delay: NoiseAndDelay, height: float, *, in_mujoco: bool
+    ) -> None:
+        """Go on as a changed robot in the present state; the controller is not told."""
+        legs = self._legs
+        if isinstance(legs, LegSimulator):
+            legs.set_robots([robot])
+        else:
+            self._legs = _simulator(robot, in_mujoco=in_mujoco)
+            self._legs.state[:] = legs.state
+            self._legs.forget(_ALL)
+            self._legs.push(np.array([self._force]))
+        self._plant = Plant(self._legs, noise_and_delay, SoftLimits(), self._rng)
+        self._restart(height)
 
     def tick(self, height: float, force: float) -> Array:
         """Let one control period pass; return its row, (fields of a track,).
@@ -263,24 +301,13 @@ class LiveLeg:
         row[5:7] = self._plant.drive(torque)[0]
         row[8] = self.controller.internals().get("phase", np.array([np.nan]))[0]
         if not np.abs(legs.qd).max() < _IMPOSSIBLE:
-            raise PhysicsError(f"The simulation of {self.robot.name} became unstable.")
+            raise PhysicsError(f"The simulation of {legs.robot.name} became unstable.")
         return row
 
-    def _simulator(self) -> LegSimulator | MujocoSimulator:
-        kind = MujocoSimulator if self._in_mujoco else LegSimulator
-        return kind(self.settings.apply(self.robot), 1, rate=CONTROL_RATE, threads=1)
-
-    def _go_on(self, height: float) -> None:
-        """Simulate from the present state on with the present settings."""
-        if isinstance(self._legs, LegSimulator):
-            self._legs.set_robots([self.settings.apply(self.robot)])
-        else:
-            state, self._legs = self._legs.state.copy(), self._simulator()
-            self._legs.state[:] = state
-            self._legs.forget(_ALL)
-            self._legs.push(np.array([self._force]))
-        self._connect()
+    def _restart(self, height: float) -> None:
         self._plant.channel.restart(_ALL, self._legs.q, self._legs.qd, np.array([height]))
 
-    def _connect(self) -> None:
-        self._plant = Plant(self._legs, self.settings.noise_and_delay, SoftLimits(), self._rng)
+
+def _simulator(robot: Robot, *, in_mujoco: bool) -> LegSimulator | MujocoSimulator:
+    kind = MujocoSimulator if in_mujoco else LegSimulator
+    return kind(robot, 1, rate=CONTROL_RATE, threads=1)

@@ -1,8 +1,9 @@
-"""Inputs of the page and the queue that carries them to the thread that simulates."""
+"""Inputs of the page, the queue that carries them to the thread that simulates, its clock."""
 
+from collections import deque
 from collections.abc import Callable, Collection, Coroutine
 from queue import Empty, SimpleQueue
-from typing import Any
+from typing import Any, NamedTuple
 
 import viser
 
@@ -10,8 +11,8 @@ from hopping_leg.controllers.registry import controller_names
 from hopping_leg.errors import HoppingLegError, UsageError
 from hopping_leg.io import is_number, one_line
 from hopping_leg.robot import load_robot, shipped_robots
-from hopping_leg.viewer import data_source, live_leg, playback_clock
-from hopping_leg.viewer import live_settings as ranges
+from hopping_leg.viewer import data_source, live_leg
+from hopping_leg.viewer.live_leg import Range
 
 Action = Callable[[], None]
 _ROUNDING = 1e-6  # Of the page's numbers
@@ -29,7 +30,7 @@ def chosen(handle: Any, offered: Collection[str]) -> str:  # noqa: ANN401
     return str(handle.value)
 
 
-def within(handle: Any, bounds: ranges.Range) -> float:  # noqa: ANN401
+def within(handle: Any, bounds: Range) -> float:  # noqa: ANN401
     """Return a number of the page; UsageError where its slider does not reach it."""
     value, (low, high) = handle.value, bounds
     if not is_number(value) or not low - _ROUNDING <= value <= high + _ROUNDING:
@@ -61,27 +62,41 @@ class GuiQueue:
                 complaints.append(str(error))
 
     def from_page(self, action: Action) -> Callable[[Any], Coroutine[Any, Any, None]]:
-        """Return a callback for an input or button; what the server itself sets is no action."""
+        """Return a callback for an input or key; what the server itself sets is no action."""
 
-        async def callback(event: viser.GuiEvent[Any]) -> None:
+        async def callback(event: viser.GuiEvent[Any] | viser.CommandEvent) -> None:
             if event.client is not None:
                 self.put(action)
 
         return callback
 
-    def from_keys(self, action: Action) -> Callable[[Any], Coroutine[Any, Any, None]]:
-        """Return a callback for a key."""
-
-        async def callback(_: object) -> None:
-            self.put(action)
-
-        return callback
+    def add_keys(self, gui: viser.GuiApi, *keys: tuple[str, Any, Action]) -> None:
+        """Let keys of the page, each with what it is called, do something."""
+        for label, key, action in keys:
+            gui.add_command(label, hotkey=key).on_trigger(self.from_page(action))
 
 
 NOBODY = "nobody"  # beside the leg
 HEIGHT_STEP = 0.005  # of the slider, m
 KEY_STEP = 0.01
 """Of the keys K and J, m; arrows are the slider's own once it has the focus."""
+
+
+class _Setting(NamedTuple):
+    label: str
+    valid: Range
+    scale: float  # shown over stored unit
+    step: float  # as shown
+    hint: str | None = None
+
+
+_SETTINGS = {
+    "payload": _Setting("Payload, kg", live_leg.PAYLOAD, 1.0, 0.05),
+    "time_constant": _Setting(
+        "Ground, ms", live_leg.TIME_CONSTANT, 1e3, 1.0, "Time constant; small is hard"
+    ),
+    "delay": _Setting("Delay, ms", live_leg.DELAY, 1e3, 0.5, "Of commands, beyond the robot's own"),
+}
 
 
 class LivePanel:
@@ -109,51 +124,33 @@ class LivePanel:
         stand = gui.add_button("Stand up", icon=viser.Icon.RELOAD, hint="Begin anew; key R")
         stand.on_click(queue.from_page(live.stand))
         with gui.add_folder("Not told to the controller"):
-            self._add_settings(gui, queue)
+            self._sliders = {
+                name: _slider(gui, s.label, _shown(s), s.step, self._setting(name), s.hint)
+                for name, s in _SETTINGS.items()
+            }
+            hint = "The paper's noise and random delay of measurements"
+            self._noise = gui.add_checkbox("Noise", live.settings.noise, hint=hint)
+        self._noise.on_update(queue.from_page(self._settings))
+        for slider in self._sliders.values():
+            slider.on_update(queue.from_page(self._settings))
         with gui.add_folder("Push the base"):
-            force = _slider(gui, "Force, N", ranges.PUSH, 1.0, 30.0)
+            force = _slider(gui, "Force, N", live_leg.PUSH, 1.0, 30.0)
             up = gui.add_button("Push up", icon=viser.Icon.ARROW_UP, hint="Key P")
             down = gui.add_button("Push down", icon=viser.Icon.ARROW_DOWN, hint="Key O")
 
         def push(sign: int) -> None:
-            live.push(sign * within(force, ranges.PUSH))
+            live.push(sign * within(force, live_leg.PUSH))
 
         up.on_click(queue.from_page(lambda: push(1)))
         down.on_click(queue.from_page(lambda: push(-1)))
-        keys = (
+        queue.add_keys(
+            gui,
             ("Higher", "K", lambda: self._change(KEY_STEP)),
             ("Lower", "J", lambda: self._change(-KEY_STEP)),
             ("Push up", "P", lambda: push(1)),
             ("Push down", "O", lambda: push(-1)),
             ("Stand up", "R", live.stand),
         )
-        for label, key, action in keys:
-            gui.add_command(label, hotkey=key).on_trigger(queue.from_keys(action))  # type: ignore[arg-type]
-
-    def _add_settings(self, gui: viser.GuiApi, queue: GuiQueue) -> None:
-        settings = self._live.settings
-        self._payload = _slider(gui, "Payload, kg", ranges.PAYLOAD, 0.05, settings.payload)
-        self._ground = _slider(
-            gui,
-            "Ground, ms",
-            _thousandfold(ranges.TIME_CONSTANT),
-            1.0,
-            1e3 * settings.time_constant,
-            "Time constant; small is hard",
-        )
-        self._delay = _slider(
-            gui,
-            "Delay, ms",
-            _thousandfold(ranges.DELAY),
-            0.5,
-            1e3 * settings.delay,
-            "Of commands, beyond the robot's own",
-        )
-        self._noise = gui.add_checkbox(
-            "Noise", settings.noise, hint="The paper's noise and random delay of measurements"
-        )
-        for handle in (self._payload, self._ground, self._delay, self._noise):
-            handle.on_update(queue.from_page(self._settings))
 
     def _set_height(self) -> None:
         self._live.set_height(within(self._height, self._live.valid))
@@ -177,10 +174,15 @@ class LivePanel:
             self._show()
 
     def _settings(self) -> None:
-        ground, delay = 1e-3 * self._ground.value, 1e-3 * self._delay.value
-        self._live.set_settings(
-            ranges.LiveSettings(ground, self._payload.value, delay, self._noise.value)
-        )
+        values = {
+            name: within(self._sliders[name], _shown(setting)) / setting.scale
+            for name, setting in _SETTINGS.items()
+        }
+        self._live.set_settings(live_leg.LiveSettings(noise=self._noise.value, **values))
+
+    def _setting(self, name: str) -> float:
+        """Return one as it is shown."""
+        return _SETTINGS[name].scale * float(getattr(self._live.settings, name))
 
     def _show(self) -> None:
         """Bring all inputs in line with the simulation, which may have refused."""
@@ -189,26 +191,26 @@ class LivePanel:
         put_value(self._height, live.height)
         put_value(self._first, live.names[0])
         put_value(self._second, live.names[1] if len(live.names) > 1 else NOBODY)
-        put_value(self._payload, live.settings.payload)
         put_value(self._noise, live.settings.noise)
-        put_value(self._ground, 1e3 * live.settings.time_constant)
-        put_value(self._delay, 1e3 * live.settings.delay)
+        for name, slider in self._sliders.items():
+            put_value(slider, self._setting(name))
+
+
+def _shown(setting: _Setting) -> Range:
+    low, high = setting.valid
+    return setting.scale * low, setting.scale * high
 
 
 def _slider(
     gui: viser.GuiApi,
     label: str,
-    bounds: ranges.Range,
+    bounds: Range,
     step: float,
     value: float,
     hint: str | None = None,
 ) -> viser.GuiSliderHandle[float]:
     low, high = bounds
     return gui.add_slider(label, min=low, max=high, step=step, initial_value=value, hint=hint)
-
-
-def _thousandfold(bounds: ranges.Range) -> ranges.Range:
-    return 1e3 * bounds[0], 1e3 * bounds[1]
 
 
 class ReplayPanel:
@@ -235,24 +237,79 @@ class ReplayPanel:
         self._shown = self._replay.now
 
 
+SPEEDS = (0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0)
+"""Shown seconds per second that can be chosen."""
+
+LONGEST = 0.1
+"""Seconds that are made up for after a stall; more is left out."""
+
+_WINDOW = 2.0
+
+
+class PlaybackClock:
+    """Turns time on the wall into time to be shown, in whole ticks of so many seconds."""
+
+    def __init__(self, tick: float) -> None:
+        self.speed, self.paused = 1.0, False
+        self._tick = tick
+        self._steps = 0
+        self._owed = 0.0
+        self._past: deque[tuple[float, float]] = deque()
+        self._wall = self._shown = 0.0
+
+    def step(self, ticks: int = 1) -> None:
+        """Pause, and show that many ticks more."""
+        self.paused = True
+        self._steps += ticks
+
+    def due(self, elapsed: float) -> float:
+        """Return how much time to show, s, given the time on the wall since the last call, s."""
+        ticks = self._steps
+        self._steps = 0
+        if self.paused:
+            self._owed = 0.0
+            self._past.clear()
+            return ticks * self._tick
+        self._owed += min(elapsed, LONGEST) * self.speed
+        ticks += int(self._owed / self._tick + 1e-9)
+        self._owed = max(self._owed - ticks * self._tick, 0.0)
+        self._wall += elapsed
+        self._shown += ticks * self._tick
+        self._past.append((self._wall, self._shown))
+        while self._wall - self._past[0][0] > _WINDOW:
+            self._past.popleft()
+        return ticks * self._tick
+
+    @property
+    def real_time(self) -> float:
+        """Shown over due time in the last two seconds: 1 keeps up, NaN while paused."""
+        if len(self._past) < 2:
+            return float("nan")
+        wall, shown = self._past[0]
+        return (self._shown - shown) / (self._wall - wall) / self.speed
+
+    def set_speed(self, speed: float) -> None:
+        """Go on at another speed."""
+        self.speed = speed
+        self._past.clear()
+
+
 class TimeControls:
     """Pause, step and speed, by buttons and keys."""
 
-    def __init__(
-        self, server: viser.ViserServer, queue: GuiQueue, clock: playback_clock.PlaybackClock
-    ) -> None:
+    def __init__(self, server: viser.ViserServer, queue: GuiQueue, clock: PlaybackClock) -> None:
         self._clock = clock
         gui = server.gui
         self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, hint="Space")
         step = gui.add_button("Single step", icon=viser.Icon.PLAYER_SKIP_FORWARD, hint="Key S")
-        names = tuple(f"{speed:g}" for speed in playback_clock.SPEEDS)
+        names = tuple(f"{speed:g}" for speed in SPEEDS)
         speed = gui.add_dropdown("Speed", names, initial_value="1", hint="1 is real time")
         self._pause.on_click(queue.from_page(self._toggle))
         step.on_click(queue.from_page(self._step))
         speed.on_update(queue.from_page(lambda: clock.set_speed(float(chosen(speed, names)))))
-        keys = (("Pause or go on", "space", self._toggle), ("Single step", "S", self._step))
-        for label, key, action in keys:
-            gui.add_command(label, hotkey=key).on_trigger(queue.from_keys(action))  # type: ignore[arg-type]
+        queue.add_keys(
+            gui, ("Pause or go on", "space", self._toggle), ("Single step", "S", self._step)
+        )
 
     def _toggle(self) -> None:
         self._clock.paused = not self._clock.paused

@@ -13,7 +13,7 @@ from viser import _messages
 from hopping_leg.colours import COLOURS, rgb
 from hopping_leg.errors import UsageError
 from hopping_leg.sim import CONTROL_RATE
-from hopping_leg.viewer import access, charts, data_source, live_leg, panels, playback_clock, scene
+from hopping_leg.viewer import access, charts, data_source, live_leg, panels, scene
 
 _HOST = "127.0.0.1"
 FRAME_RATE = 60.0
@@ -53,7 +53,7 @@ class Viewer:
         self.address = f"http://{_HOST}:{self._server.get_port()}"
         if detail is not None:
             self.address += f"/?fixedDpr={detail:g}"
-        self.clock = playback_clock.PlaybackClock(1 / CONTROL_RATE)
+        self.clock = panels.PlaybackClock(1 / CONTROL_RATE)
         self._queue = panels.GuiQueue()
         gui = self._server.gui
         brand = rgb(COLOURS[0])

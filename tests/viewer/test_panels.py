@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from hopping_leg.viewer.playback_clock import LONGEST, PlaybackClock
+from hopping_leg.viewer.panels import LONGEST, PlaybackClock
 
 TICK = 0.005
 
