@@ -249,7 +249,7 @@ def test_a_simulated_trace_is_shown_as_recorded(simulated, tmp_path):
     assert track.name == "energy-shaping"
     assert track.note == ""
     np.testing.assert_array_equal(track.field("height_m"), simulated.column("height_m"))
-    _, apexes = track.apexes(1.5, 1.5)
+    apexes = track.apexes(1.5, 1.5)
     assert len(apexes)
     assert np.all(apexes > 0.2)
 

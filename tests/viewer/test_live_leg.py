@@ -28,7 +28,7 @@ def heights(live, leg=0):
 
 
 def last_apexes(live, leg=0, seconds=1.5):
-    return live.tracks[leg].apexes(live.now, seconds)[1]
+    return live.tracks[leg].apexes(live.now, seconds)
 
 
 def test_the_leg_hops_to_what_is_commanded_while_it_runs():

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import mujoco
@@ -20,7 +19,8 @@ _APART = 0.36  # between legs, m
 _AWAY = 1.2  # of the camera from a single leg, m
 _FIELD_OF_VIEW = math.radians(32)
 _FLOOR = (1.2, 0.5)  # half its size, m
-_APEX_SECONDS = 3.0
+_RULER: Colour = (90, 96, 104)
+_AXLE: Colour = (235, 238, 242)
 
 PLAIN: Any = {"material": "toon3", "cast_shadow": False, "receive_shadow": False}
 """Of every shape: the shading that costs least where a browser draws in software."""
@@ -39,11 +39,12 @@ def track_colours(tracks: Sequence[Track]) -> list[str]:
     return list(own.values()) if len(own) == len(names) else list(COLOURS[: len(names)])
 
 
-@dataclass(frozen=True)
-class LegMesh:
-    """Handles of one leg: the base slides, thigh and shank turn."""
+class _Leg(NamedTuple):
+    """Handles of what moves: the base slides, thigh and shank turn, two bars mark heights."""
 
     root: viser.FrameHandle
+    command: viser.BoxHandle
+    apex: viser.BoxHandle
     base: viser.FrameHandle
     thigh: viser.FrameHandle
     shank: viser.FrameHandle
@@ -55,47 +56,56 @@ class LegMesh:
         self.shank.wxyz = _turned(q[1])
 
 
-def add_leg(
-    server: viser.ViserServer, name: str, robot: Robot, x: float, colour: Colour
-) -> LegMesh:
-    """Put a leg into the scene at a path; its rail stands at ``x``, m."""
-    model = build_model(robot)
-    root = server.scene.add_frame(name, show_axes=False, position=(x, 0.0, 0.0))
+def _add_leg(scene: viser.SceneApi, number: int, robot: Robot, colour: Colour) -> _Leg:
+    """Put a leg into the scene, with its ruler and marks."""
+    name, model = f"/legs/{number}", build_model(robot)
+    root = scene.add_frame(name, show_axes=False, position=(_APART * number, 0.0, 0.0))
     paths, frames = {0: name}, []
     for body in range(1, model.nbody):
-        path = f"{paths[int(model.body_parentid[body])]}/{model.body(body).name}"
-        frames.append(
-            server.scene.add_frame(path, show_axes=False, position=tuple(model.body_pos[body]))
-        )
-        paths[body] = path
+        paths[body] = f"{paths[int(model.body_parentid[body])]}/{model.body(body).name}"
+        place = tuple(model.body_pos[body])
+        frames.append(scene.add_frame(paths[body], show_axes=False, position=place))
     for geom in range(model.ngeom):
         path = f"{paths[int(model.geom_bodyid[geom])]}/{model.geom(geom).name}_shape"
-        _add_shape(server, path, model, geom, colour)
-    return LegMesh(root, *frames)
+        _add_shape(scene, path, model, geom, colour)
+    for tenth in range(1, 6):
+        scene.add_label(
+            f"{name}/ruler/label{tenth}",
+            f"{tenth / 10:g}",
+            position=(-0.115, 0.027, tenth / 10),
+            font_screen_scale=1.5,
+            anchor="center-right",
+        )
+    for tick in range(1, 17):
+        x, long = (-0.086, 0.016) if tick % 2 == 0 else (-0.082, 0.008)
+        size, place = (long, 0.002, 0.0016), (x, 0.027, 0.05 * tick)
+        scene.add_box(f"{name}/ruler/{tick}", _RULER, size, position=place, **PLAIN)
+    command, apex = (
+        scene.add_box(f"{name}/{mark}", its, (0.26, 0.002, thick), visible=False, **PLAIN)
+        for mark, its, thick in (("command", rgb(COMMAND), 0.003), ("apex", colour, 0.002))
+    )
+    return _Leg(root, command, apex, *frames)
 
 
 def _add_shape(
-    server: viser.ViserServer, path: str, model: mujoco.MjModel, geom: int, colour: Colour
+    scene: viser.SceneApi, path: str, model: mujoco.MjModel, geom: int, colour: Colour
 ) -> None:
-    name, size = model.geom(geom).name, model.geom_size[geom]
+    name, kind, size = model.geom(geom).name, model.geom_type[geom], model.geom_size[geom]
     red, green, blue = (int(255 * value) for value in model.mat_rgba[model.geom_matid[geom]][:3])
-    rgb = (red, green, blue)
-    kind = model.geom_type[geom]
-    scene = server.scene
+    own = (red, green, blue)
     place: Any = {"position": tuple(model.geom_pos[geom]), **PLAIN}
     turned = tuple(model.geom_quat[geom])
     if name in _HOUSINGS:
         width = 1.1 * size[0] if name == "base" else 1.8 * size[0]
         scene.add_cylinder(path, size[0], width, colour, wxyz=_ACROSS, **place)
-        axle = (235, 238, 242)
-        path += "_axle"
-        scene.add_cylinder(path, 0.35 * size[0], width + 0.008, axle, wxyz=_ACROSS, **place)
+        axle = 0.35 * size[0], width + 0.008, _AXLE
+        scene.add_cylinder(f"{path}_axle", *axle, wxyz=_ACROSS, **place)
     elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        scene.add_icosphere(path, size[0], rgb, **place)
+        scene.add_icosphere(path, size[0], own, **place)
     elif kind == mujoco.mjtGeom.mjGEOM_BOX:
-        scene.add_box(path, rgb, tuple(2 * size), wxyz=turned, **place)
+        scene.add_box(path, own, tuple(2 * size), wxyz=turned, **place)
     elif kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        scene.add_cylinder(path, size[0], 2 * size[1], rgb, wxyz=turned, **place)
+        scene.add_cylinder(path, size[0], 2 * size[1], own, wxyz=turned, **place)
 
 
 def _turned(angle: float) -> Array:
@@ -103,18 +113,12 @@ def _turned(angle: float) -> Array:
     return np.array([math.cos(angle / 2), 0.0, -math.sin(angle / 2), 0.0])
 
 
-class _Drawn(NamedTuple):
-    mesh: LegMesh
-    command: viser.BoxHandle
-    apex: viser.BoxHandle
-
-
 class Scene:
     """Draws tracks; call ``show`` for every picture."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
-        self._drawn: list[_Drawn] = []
+        self._legs: list[_Leg] = []
         self._tracks: list[Track] = []
         _light(server.scene)
         _add_floor(server.scene)
@@ -124,65 +128,32 @@ class Scene:
         if tracks is not self._tracks:
             self._build(tracks)
         with self._server.atomic():
-            for drawn, track in zip(self._drawn, tracks, strict=True):
+            for leg, track in zip(self._legs, tracks, strict=True):
                 if len(track):
-                    drawn.mesh.pose(*track.moment(now))
+                    leg.pose(*track.moment(now))
 
     def mark(self, now: float) -> None:
         """Move the marks of command and last apex; may be called less often than ``show``."""
-        for drawn, track in zip(self._drawn, self._tracks, strict=True):
-            _, apexes = track.apexes(now, _APEX_SECONDS)
-            _put(drawn.command, track.latest("command_m", now))
-            _put(drawn.apex, apexes[-1] if len(apexes) else math.nan)
+        for leg, track in zip(self._legs, self._tracks, strict=True):
+            _put(leg.command, track.latest("command_m", now))
+            _put(leg.apex, track.last_apex(now))
 
     def _build(self, tracks: list[Track]) -> None:
-        for drawn in self._drawn:
-            drawn.mesh.root.remove()
+        """Put up the legs; turn all cameras, also those of pages that are open, to them."""
+        for leg in self._legs:
+            leg.root.remove()
         self._tracks = tracks
         shown = zip(tracks, track_colours(tracks), strict=True)
-        self._drawn = [self._add(n, track, rgb(colour)) for n, (track, colour) in enumerate(shown)]
-        self._look(len(tracks))
-
-    def _look(self, legs: int) -> None:
-        """Turn all cameras, also those of pages that are open, to so many legs."""
-        middle = _APART * (legs - 1) / 2
+        self._legs = [
+            _add_leg(self._server.scene, number, track.robot, rgb(colour))
+            for number, (track, colour) in enumerate(shown)
+        ]
+        middle = _APART * (len(tracks) - 1) / 2
         look_at, position = (middle, 0.0, 0.25), (middle + 0.12, -_AWAY - 3 * middle, 0.38)
-        initial = self._server.initial_camera
-        initial.fov, initial.look_at, initial.position = _FIELD_OF_VIEW, look_at, position
-        for client in self._server.get_clients().values():
-            client.camera.position = position
-            client.camera.look_at = look_at
-
-    def _add(self, number: int, track: Track, colour: Colour) -> _Drawn:
-        name = f"/legs/{number}"
-        mesh = add_leg(self._server, name, track.robot, _APART * number, colour)
-        for tenth in range(1, 6):
-            self._server.scene.add_label(
-                f"{name}/ruler/label{tenth}",
-                f"{tenth / 10:g}",
-                position=(-0.115, 0.027, tenth / 10),
-                font_screen_scale=1.5,
-                anchor="center-right",
-            )
-        for tick in range(1, 17):
-            long = tick % 2 == 0
-            self._server.scene.add_box(
-                f"{name}/ruler/{tick}",
-                (90, 96, 104),
-                (0.016 if long else 0.008, 0.002, 0.0016),
-                position=(-0.086 if long else -0.082, 0.027, 0.05 * tick),
-                **PLAIN,
-            )
-        return _Drawn(
-            mesh,
-            self._bar(f"{name}/command", rgb(COMMAND), 0.003),
-            self._bar(f"{name}/apex", colour, 0.002),
-        )
-
-    def _bar(self, name: str, colour: Colour, thick: float) -> viser.BoxHandle:
-        return self._server.scene.add_box(
-            name, colour, (0.26, 0.002, thick), visible=False, **PLAIN
-        )
+        self._server.initial_camera.fov = _FIELD_OF_VIEW
+        cameras: list[Any] = [c.camera for c in self._server.get_clients().values()]
+        for camera in (self._server.initial_camera, *cameras):
+            camera.position, camera.look_at = position, look_at
 
 
 def _put(bar: viser.BoxHandle, height: float) -> None:

@@ -30,6 +30,7 @@ FIELDS = (
 _PLACE = {name: row for row, name in enumerate(FIELDS)}
 _ESTIMATE = "estimated_height_m"
 _FIRST_ROOM = 4096
+_APEX_SECONDS = 3.0
 
 
 class Track:
@@ -107,16 +108,20 @@ class Track:
         taken[:, outside] = np.nan
         return dict(zip(FIELDS, taken, strict=True))
 
-    def apexes(self, until: float, seconds: float) -> tuple[Array, Array]:
-        """Return time, s, and height, m, of the apexes in the ``seconds`` up to a time."""
+    def apexes(self, until: float, seconds: float) -> Array:
+        """Return the heights of the apexes in the ``seconds`` up to a time, m, (hops,)."""
         first, last = np.searchsorted(self.time, [until - seconds, until + 1e-9])
         part = slice(int(first), int(last))
         names = ("height_m", "height_rate_m_s", "foot_clearance_m")
         height, rate, clearance = (self.field(name)[part] for name in names)
         if len(height) < 2:
-            return np.zeros(0), np.zeros(0)
-        hops = hop_detection.find_hops(height, rate, clearance)
-        return self.time[part][hops.tick], hops.apex
+            return np.zeros(0)
+        return hop_detection.find_hops(height, rate, clearance).apex
+
+    def last_apex(self, until: float) -> float:
+        """Return the height of the last apex up to a time, m, NaN if it is long ago."""
+        apexes = self.apexes(until, _APEX_SECONDS)
+        return float(apexes[-1]) if len(apexes) else float("nan")
 
 
 def trace_rows(

@@ -23,7 +23,6 @@ _NOTICE_SECONDS = 8.0
 _SLOW_BROWSER = "webgl-software-rendering"
 """viser's name of its notice of a slow browser."""
 _RESOLUTION = (resources.files("hopping_leg.viewer") / "resolution.js").read_text(encoding="utf-8")
-_APEX_SECONDS = 3.0
 
 
 class Viewer:
@@ -130,8 +129,8 @@ class Viewer:
         """Return what the page says: one line per leg, and the time."""
         source, lines = self._source, []
         for track, colour in zip(source.tracks, scene.track_colours(source.tracks), strict=True):
-            _, apexes = track.apexes(source.now, _APEX_SECONDS)
-            apex = f"{apexes[-1]:.3f} m" if len(apexes) else "none yet"
+            height = track.last_apex(source.now)
+            apex = "none yet" if math.isnan(height) else f"{height:.3f} m"
             lines.append(
                 f'<b style="color:{colour}">'
                 f'{html.escape(track.name)}</b>: last apex <span class="apex">{apex}</span>'
