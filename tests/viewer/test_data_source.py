@@ -12,7 +12,7 @@ from hopping_leg.errors import RobotError, TraceError, UsageError
 from hopping_leg.robot import kinematics, load_robot
 from hopping_leg.trace import Trace
 from hopping_leg.viewer.data_source import RecorderSource, ReplaySource
-from hopping_leg.viewer.tracks import FIELDS, Track, load_track, trace_rows
+from hopping_leg.viewer.tracks import FIELDS, Track
 
 ROBOT = load_robot("legv2-paper")
 COLUMNS = ("time_s", "command_m", "hip_position_rad", "knee_position_rad", "hip_torque_nm")
@@ -186,6 +186,10 @@ def test_what_cannot_be_replayed_is_refused_and_an_unknown_robot_asks_for_its_fi
         ReplaySource((tmp_path / "none.parquet",))
     with pytest.raises(RobotError, match="cannot hop"):
         ReplaySource((stored(tmp_path / "p.parquet", robot="doublependulum"),))
+    empty = tmp_path / "empty.parquet"
+    Trace(pl.DataFrame({"time_s": np.zeros(0)})).save(empty)
+    with pytest.raises(TraceError, match="no tick"):
+        ReplaySource((empty,))
 
 
 def rows(count, **given):
@@ -193,26 +197,6 @@ def rows(count, **given):
     for name, entry in given.items():
         values[FIELDS.index(name)] = entry
     return values
-
-
-def hardware_trace(**columns):
-    count = len(next(iter(columns.values())))
-    nothing = np.full(count, np.nan)
-    usual = {
-        "time_s": np.arange(count) / 200,
-        "command_m": np.full(count, 0.3),
-        "height_m": nothing,
-        "hip_position_rad": np.full(count, 0.8),
-        "knee_position_rad": np.full(count, -1.6),
-    }
-    return Trace(pl.DataFrame(usual | columns))
-
-
-@pytest.fixture(scope="module")
-def simulated():
-    controller = load_controller("energy-shaping", ROBOT)
-    run = rollout(controller, RolloutConfig(ROBOT, threads=1), np.full((300, 1), 0.3), seed=0)
-    return run.trace(0)
 
 
 def test_a_bounded_track_keeps_its_newest_rows_in_order():
@@ -242,10 +226,13 @@ def test_a_moment_lies_between_its_rows_and_samples_outside_of_them_are_unknown(
     assert np.isnan(track.latest("command_m", 0.5))
 
 
-def test_a_simulated_trace_is_shown_as_recorded(simulated, tmp_path):
+def test_a_simulated_trace_is_shown_as_recorded(tmp_path):
+    controller = load_controller("energy-shaping", ROBOT)
+    run = rollout(controller, RolloutConfig(ROBOT, threads=1), np.full((300, 1), 0.3), seed=0)
+    simulated = run.trace(0)
     path = tmp_path / "run.parquet"
     simulated.save(path)
-    track = load_track(path, ROBOT)
+    (track,) = ReplaySource((path,)).tracks
     assert track.name == "energy-shaping"
     assert track.note == ""
     np.testing.assert_array_equal(track.field("height_m"), simulated.column("height_m"))
@@ -254,19 +241,10 @@ def test_a_simulated_trace_is_shown_as_recorded(simulated, tmp_path):
     assert np.all(apexes > 0.2)
 
 
-@pytest.mark.parametrize(
-    ("before", "expected"), [(None, [1.0, 1.0, 1.0, 2.0]), ((0.5, -1.0), [0.5, 1.0, 1.0, 2.0])]
-)
-def test_missing_angles_stay_as_they_were(before, expected):
-    trace = hardware_trace(hip_position_rad=[np.nan, 1.0, np.nan, 2.0])
-    _, values, _ = trace_rows(trace, ROBOT, before)
-    np.testing.assert_array_equal(values[FIELDS.index("hip_position_rad")], expected)
-
-
-def test_nothing_is_refused(tmp_path):
-    with pytest.raises(TraceError, match="no rows"):
-        Track("x", ROBOT).moment(0.0)
-    path = tmp_path / "empty.parquet"
-    hardware_trace(hip_position_rad=np.zeros(0)).save(path)
-    with pytest.raises(TraceError, match="no tick"):
-        load_track(path, ROBOT)
+def test_missing_angles_stay_as_they_were():
+    columns = {"time_s": np.arange(4), "knee_position_rad": np.full(4, -1.6)}
+    columns["hip_position_rad"] = [np.nan, 1.0, np.nan, 2.0]
+    track = Track("x", ROBOT)
+    for expected in ([1.0, 1.0, 1.0, 2.0], [2.0, 1.0, 1.0, 2.0]):
+        track.extend_by_trace(Trace(pl.DataFrame(columns)))
+        np.testing.assert_array_equal(track.field("hip_position_rad")[-4:], expected)

@@ -10,7 +10,7 @@ from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorderTail
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.viewer.live_leg import MOST
-from hopping_leg.viewer.tracks import Track, load_track, trace_rows
+from hopping_leg.viewer.tracks import Track
 
 
 class DataSource(Protocol):
@@ -45,7 +45,7 @@ class ReplaySource:
             )
         self.notices: list[str] = []
         self.now = 0.0
-        self.tracks = [load_track(path, self._robot(path, robot)) for path in paths]
+        self.tracks = [self._load(path, robot) for path in paths]
         for track in self.tracks:
             track.time[:] -= track.time[0]
         self.length = max(float(track.time[-1]) for track in self.tracks)
@@ -60,18 +60,20 @@ class ReplaySource:
         """Show another time, s."""
         self.now = min(max(time, 0.0), self.length)
 
-    def _robot(self, path: Path, robot: str | None) -> Robot:
-        header = trace.Trace.load(path).header
-        if robot:
-            found = load_robot(robot)
-        else:
-            found = _load_shipped(str(header.get("robot", "")), f"{path} was recorded from")
-        found.require_leg()
-        if not found.has_digest(header.get("robot_digest", found.digest)):
+    def _load(self, path: Path, robot: str | None) -> Track:
+        stored = trace.Trace.load(path)
+        if not len(stored.table):
+            raise errors.TraceError(f"{path} holds no tick; there is nothing to show.")
+        name = str(stored.header.get("robot", ""))
+        leg = load_robot(robot) if robot else _load_shipped(name, f"{path} was recorded from")
+        leg.require_leg()
+        if not leg.has_digest(stored.header.get("robot_digest", leg.digest)):
             self.notices.append(
-                f"{path.name} was recorded from other parameters than those of {found.name}."
+                f"{path.name} was recorded from other parameters than those of {leg.name}."
             )
-        return found
+        track = Track(str(stored.header.get("controller", path.stem)), leg)
+        track.extend_by_trace(stored)
+        return track
 
 
 def _load_shipped(name: str, origin: str) -> Robot:
@@ -138,12 +140,9 @@ class RecorderSource:
             robot = _load_shipped(name, f"{self._tail.path} is of")
             depth = round(KEPT_SECONDS * CONTROL_RATE)
             self.tracks = [Track(str(header.get("controller", "")), robot, depth=depth)]
-        track = self.tracks[0]
         table = pl.DataFrame(dict(zip(self._tail.columns, rows.T, strict=True)))
-        last = tuple(track.moment(self.now)[1]) if len(track) else None
-        time, values, track.note = trace_rows(trace.Trace(table), track.robot, last)
-        track.extend(time, values)
-        self.now = float(time[-1])
+        self.tracks[0].extend_by_trace(trace.Trace(table))
+        self.now = float(self.tracks[0].time[-1])
 
     def _look(self) -> None:
         """Turn to a newer run, if there is one; say when this one is over."""

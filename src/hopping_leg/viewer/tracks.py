@@ -5,11 +5,10 @@ outside; scene and plots know nothing but tracks.
 """
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
-from hopping_leg import errors, hop_detection
+from hopping_leg import hop_detection
 from hopping_leg.arrays import Array
 from hopping_leg.robot import Robot, kinematics
 from hopping_leg.trace import Trace
@@ -28,6 +27,7 @@ FIELDS = (
 """What a row holds beside its time; names are those of traces. ``phase`` is the controller's."""
 
 _PLACE = {name: row for row, name in enumerate(FIELDS)}
+_ANGLES = ("hip_position_rad", "knee_position_rad")
 _ESTIMATE = "estimated_height_m"
 _FIRST_ROOM = 4096
 _APEX_SECONDS = 3.0
@@ -39,14 +39,14 @@ class Track:
     Args:
         name: Of who controls the leg.
         robot: The leg.
-        note: What the reader should know of where the rows come from.
         depth: Rows that are kept at least; older ones are forgotten. None keeps all.
+
+    Attributes:
+        note: What the reader should know of where the rows come from.
     """
 
-    def __init__(
-        self, name: str, robot: Robot, *, note: str = "", depth: int | None = None
-    ) -> None:
-        self.name, self.robot, self.note = name, robot, note
+    def __init__(self, name: str, robot: Robot, *, depth: int | None = None) -> None:
+        self.name, self.robot, self.note = name, robot, ""
         self._depth = depth
         self._rows = np.empty((1 + len(FIELDS), 2 * depth if depth else _FIRST_ROOM))
         self._count = 0
@@ -80,17 +80,33 @@ class Track:
         self._rows[1:, into] = values
         self._count += new
 
-    def moment(self, time: float) -> tuple[float, Array]:
-        """Return base height, m, and joint angles, rad, (2,), at a time, between rows if need be.
+    def extend_by_trace(self, trace: Trace) -> None:
+        """Add the rows of a trace; ``note`` says what height is shown where none was measured.
 
-        Raises:
-            TraceError: There is no row.
+        Hardware does not measure the base height. The controller's own estimate stands in where it
+        recorded one; else the leg is shown standing, at the height its joints give a foot on the
+        ground, which is right in stance and too low in flight. The clearance stays unknown. Joint
+        angles that are missing are those before them.
         """
-        if not self._count:
-            raise errors.TraceError(f"{self.name} has no rows yet.")
-        names = ("height_m", "hip_position_rad", "knee_position_rad")
-        height, hip, knee = (float(np.interp(time, self.time, self.field(n))) for n in names)
-        return height, np.array([hip, knee])
+        known, unknown = trace.table.columns, np.full(len(trace.table), np.nan)
+        columns = {name: trace.column(name) if name in known else unknown for name in FIELDS}
+        for name in _ANGLES:
+            last = float(self.field(name)[-1]) if self._count else None
+            columns[name] = _filled(columns[name], last)
+        if not np.isfinite(columns["height_m"]).any():
+            q = np.stack([columns[name] for name in _ANGLES], axis=-1)
+            columns["height_m"] = kinematics.stance_height(self.robot, q)
+            self.note = "The height was not measured: the leg is shown standing."
+            if _ESTIMATE in known:
+                estimate = trace.column(_ESTIMATE)
+                columns["height_m"] = np.where(np.isfinite(estimate), estimate, columns["height_m"])
+                self.note = "The height was not measured: it is the controller's estimate."
+        self.extend(trace.column("time_s"), np.stack(list(columns.values())))
+
+    def moment(self, time: float) -> tuple[float, Array]:
+        """Return base height, m, and joint angles, rad, (2,), at a time, also between rows."""
+        height, *q = (np.interp(time, self.time, self.field(n)) for n in ("height_m", *_ANGLES))
+        return float(height), np.array(q)
 
     def latest(self, name: str, time: float) -> float:
         """Return a field of the last row up to a time, NaN if there is none."""
@@ -122,49 +138,6 @@ class Track:
         """Return the height of the last apex up to a time, m, NaN if it is long ago."""
         apexes = self.apexes(until, _APEX_SECONDS)
         return float(apexes[-1]) if len(apexes) else float("nan")
-
-
-def trace_rows(
-    trace: Trace, robot: Robot, before: tuple[float, float] | None = None
-) -> tuple[Array, Array, str]:
-    """Return times (rows,), values (fields, rows) and a note on the height of a trace.
-
-    Hardware does not measure the base height. The controller's own estimate stands in where it
-    recorded one; else the leg is shown standing, at the height its joints give a foot on the
-    ground, which is right in stance and too low in flight. The clearance stays unknown.
-
-    Joint angles that are missing at the beginning are those ``before``, rad.
-    """
-    unknown = np.full(len(trace.table), np.nan)
-    known = trace.table.columns
-    columns = {name: trace.column(name) if name in known else unknown for name in FIELDS}
-    for joint, name in enumerate(("hip_position_rad", "knee_position_rad")):
-        columns[name] = _filled(columns[name], before[joint] if before else None)
-    note = ""
-    if not np.isfinite(columns["height_m"]).any():
-        q = np.stack([columns["hip_position_rad"], columns["knee_position_rad"]], axis=-1)
-        columns["height_m"] = kinematics.stance_height(robot, q)
-        note = "The height was not measured: the leg is shown standing."
-        if _ESTIMATE in known:
-            estimate = trace.column(_ESTIMATE)
-            columns["height_m"] = np.where(np.isfinite(estimate), estimate, columns["height_m"])
-            note = "The height was not measured: it is the controller's estimate."
-    return trace.column("time_s"), np.stack([columns[name] for name in FIELDS]), note
-
-
-def load_track(path: Path, robot: Robot) -> Track:
-    """Return the track of a stored trace.
-
-    Raises:
-        TraceError: It cannot be read, lacks a column or holds no tick.
-    """
-    trace = Trace.load(path)
-    if not len(trace.table):
-        raise errors.TraceError(f"{path} holds no tick; there is nothing to show.")
-    time, values, note = trace_rows(trace, robot)
-    track = Track(str(trace.header.get("controller", path.stem)), robot, note=note)
-    track.extend(time, values)
-    return track
 
 
 def in_flight(clearance: Array) -> Array:
