@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hopping_leg.errors import RobotError, UsageError, unknown_name
-from hopping_leg.io import Tree, one_line, replace_at, safe_file_name
+from hopping_leg.io import Tree, replace_at, safe_file_name
 from hopping_leg.robot.hardware import Hardware, torque_constant
+from hopping_leg.robot.importing.description import read_description
 from hopping_leg.robot.importing.known_numbers import (
     GIVEN,
     MOTORS,
@@ -19,10 +20,7 @@ from hopping_leg.robot.importing.known_numbers import (
     known_numbers,
 )
 from hopping_leg.robot.importing.leg_parts import Names
-from hopping_leg.robot.importing.mjcf_reader import read_mjcf
 from hopping_leg.robot.importing.planar_leg import PlanarLeg, planar_leg
-from hopping_leg.robot.importing.urdf_reader import read_urdf
-from hopping_leg.robot.importing.xml_file import parse_xml
 from hopping_leg.robot.parameters import DEFAULT_STOPS, JOINTS
 from hopping_leg.robot.robot_checks import numbers
 from hopping_leg.robot.robot_files import load_tree
@@ -64,17 +62,7 @@ def read_leg(path: Path, names: Names) -> PlanarLeg:
     Raises:
         RobotError: The file is neither, or holds no leg that moves in a plane.
     """
-    root, origin = parse_xml(path), str(path)
-    if any("xacro:" in element.tag for element in root.iter()):
-        raise RobotError(
-            f"{origin} is a xacro template; expand it first: xacro {origin} > leg.urdf."
-        )
-    readers = {"robot": read_urdf, "mujoco": read_mjcf}
-    if root.tag not in readers:
-        raise RobotError(
-            f"{origin} holds <{one_line(root.tag)}> but must hold <robot>, URDF, or <mujoco>, MJCF."
-        )
-    return planar_leg(readers[root.tag](root, origin), names, origin)
+    return planar_leg(read_description(path), names, str(path))
 
 
 def read_values(words: tuple[str, ...]) -> dict[str, float]:

@@ -97,16 +97,14 @@ def _joint(
     entries |= {f"{name}.{path}": entry for path, entry in motor.items() if "." in path}
     entries |= {f"hardware.{name}.{p}": entry for p, entry in motor.items() if "." not in p}
     gear_path, belt_path = f"{name}.motor.gear_ratio", f"{name}.belt_ratio"
-    gear, ratio = (chosen.get(gear_path) or entries.get(gear_path)), facts.get("reduction", 0.0)
-    if belt_path not in chosen and ratio > 0:
-        inside = gear is not None and math.isclose(gear[0], ratio)
-        what = "that of the motor's own gear" if inside else "taken for the belt's"
-        entries[belt_path] = 1.0 if inside else ratio, f"{where}, mechanicalReduction, {what}"
-    belt = (chosen.get(belt_path) or entries.get(belt_path) or (1.0, ""))[0]
-    if gear is None and facts.get("gear_ratio", 0.0) > 0:
-        entries[gear_path] = facts["gear_ratio"] / belt, f"{where}, drake:gear_ratio over belt"
-        gear = entries[gear_path]
-    entries |= _rotor(name, facts, where, gear, belt, motor)
+    gear = chosen.get(gear_path) or entries.get(gear_path)
+    belt = chosen.get(belt_path, (1.0, ""))[0]
+    if (armature := facts.get("armature", 0.0)) > 0:
+        source = f"{where}, armature"
+        entries[f"{name}.armature"] = armature, source
+        if gear is not None and not motor:
+            rotor = armature / (gear[0] * belt) ** 2, f"{source}, over gear and belt squared"
+            entries[f"{name}.motor.rotor_inertia"] = rotor
     for path, fact, factor in (
         ("torque_limit", "effort", 1 / belt),
         ("no_load_speed", "velocity", belt),
@@ -123,31 +121,6 @@ def _joint(
             if most is not None and most[0] < value:
                 value, source = most[0], f"{most[1]}; less than {source}"
             entries[at] = value, source
-    return entries
-
-
-def _rotor(
-    name: str,
-    facts: dict[str, float],
-    where: str,
-    gear: Entry | None,
-    belt: float,
-    motor: dict[str, Entry],
-) -> dict[str, Entry]:
-    """Return armature and the rotor's inertia, one from the other where only one is stated."""
-    rotor, path = facts.get("rotor_inertia", 0.0), f"{name}.motor.rotor_inertia"
-    entries: dict[str, Entry] = {}
-    armature, source = facts.get("armature", 0.0), f"{where}, armature"
-    if rotor > 0 and facts.get("gear_ratio", 0.0) > 0:
-        armature = rotor * facts["gear_ratio"] ** 2
-        source = f"{where}, drake:rotor_inertia times drake:gear_ratio squared"
-    if armature > 0:
-        entries[f"{name}.armature"] = armature, source
-        if gear is not None and not motor:
-            entries[path] = (
-                armature / (gear[0] * belt) ** 2,
-                f"{source}, over gear and belt squared",
-            )
     return entries
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.errors import RobotError, unknown_name
-from hopping_leg.robot.importing.body_tree import BodyTree, Point, TreeJoint
+from hopping_leg.robot.importing.description import BodyTree, Point, TreeJoint
 
 HIP = re.compile(r"hip|shoulder|thigh|upper|femur", re.IGNORECASE)
 KNEE = re.compile(r"knee|elbow|shank|calf|lower|tibia", re.IGNORECASE)

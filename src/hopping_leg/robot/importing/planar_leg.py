@@ -14,7 +14,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RobotError
-from hopping_leg.robot.importing.body_tree import BodyTree, TreeJoint
+from hopping_leg.robot.importing.description import BodyTree, TreeJoint
 from hopping_leg.robot.importing.leg_parts import (
     SAME_PLACE,
     LegParts,
