@@ -320,9 +320,8 @@ def _joints(
             "effort": efforts.get(i, 0.0),
             **stated.get(name, {}),
         }
-        kind = _KINDS.get(int(model.jnt_type[i]), "other")
-        if facts.pop("mimic", None):
-            kind = "other"
+        mimics = facts.pop("mimic", None)
+        kind = "other" if mimics else _KINDS.get(int(model.jnt_type[i]), "other")
         facts = {k: v for k, v in facts.items() if v}
         if model.jnt_limited[i]:
             facts["lower"], facts["upper"] = map(float, model.jnt_range[i])
