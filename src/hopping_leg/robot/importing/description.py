@@ -20,6 +20,8 @@ from hopping_leg.arrays import Array
 from hopping_leg.errors import RobotError
 from hopping_leg.io import one_line
 
+Kind = Literal["hinge", "slide", "other"]
+
 _LARGEST_FILE = 16 << 20  # bytes
 _MOST_ELEMENTS = 50_000
 _MOST_BODIES = 1000
@@ -47,7 +49,7 @@ _KEPT_ATTRIBUTES = {
 }
 _DROPPED = ("material", "hfield", "plugin", "fluidshape", "user", "nsample", "nuser_body")
 _REFUSED = ("include", "replicate", "attach", "composite", "flexcomp")
-_KINDS: dict[int, Literal["hinge", "slide"]] = {
+_KINDS: dict[int, Kind] = {
     int(mujoco.mjtJoint.mjJNT_HINGE): "hinge",
     int(mujoco.mjtJoint.mjJNT_SLIDE): "slide",
 }
@@ -74,7 +76,7 @@ class TreeJoint:
     name: str
     body: int
     """The body that it moves."""
-    kind: Literal["hinge", "slide", "other"]
+    kind: Kind
     anchor: Array
     """A point of its axis, m, (3,)."""
     axis: Array
@@ -321,7 +323,7 @@ def _joints(
             **stated.get(name, {}),
         }
         mimics = facts.pop("mimic", None)
-        kind = "other" if mimics else _KINDS.get(int(model.jnt_type[i]), "other")
+        kind = _KINDS.get(-1 if mimics else int(model.jnt_type[i]), "other")
         facts = {k: v for k, v in facts.items() if v}
         if model.jnt_limited[i]:
             facts["lower"], facts["upper"] = map(float, model.jnt_range[i])
