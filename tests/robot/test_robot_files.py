@@ -167,7 +167,7 @@ def test_a_part_may_be_left_out_and_the_wiring_is_no_part_of_the_physics(tmp_pat
         ("knee.motor.rated_torque", 17.0, "N m", "knee.motor.peak_torque"),
         ("contact.time_constant", 1e-4, "s", "contact.time_constant"),
         ("reality.knee.stiffness", 0.0, "N m/rad", "more than zero"),
-        ("reality.knee.efficiency", 1.2, "1", "no gear gives more"),
+        ("reality.knee.efficiency", 1.2, "1", "at most 1"),
         ("reality.hip.stiction", 0.5, "1", "give 1 or more"),
         ("reality.hip.torque_limit", 99.0, "N m", "hip.motor.peak_torque"),
         ("reality.ground.time_constant", 1e-4, "s", "two physics steps"),

@@ -45,27 +45,12 @@ PLAUSIBLE: dict[str, tuple[float, float]] = {
     "damping_ratio": (0.05, 20.0),
 }
 """Least and largest values, SI, that a leg on a rail may have, by the last part of the path."""
-_SLIPS = {
-    "kg": {1e-3: "g", 0.45359: "lb"},
-    "m": {1e-3: "mm", 1e-2: "cm", 0.0254: "inches"},
-    "kg m2": {1e-9: "g mm2 or kg um2", 1e-7: "g cm2", 1e-6: "kg mm2", 1e-4: "kg cm2"},
-    "N m": {1e-3: "mN m", 1e-2: "N cm", 0.0980665: "kgf cm"},
-    "rad/s": {math.pi / 30: "rpm", math.pi / 180: "degrees/s", 2 * math.pi: "turns/s"},
-    "rad": {math.pi / 180: "degrees", 2 * math.pi: "turns"},
-    "s": {1e-3: "ms", 1e-6: "us"},
-    "1": {},
-}
-"""What one of another unit is, SI."""
 _WIDEST = {"leg": 2 * math.pi, "pendulum": 12 * math.pi}
 """Largest joint limits, rad, by the robot's kind."""
 _HEAVIEST = 40.0  # kg, of a link per metre
 _CROSSWAYS = 1.2  # share of an inertia that the width of a link and its motor may add
 _LEAST_GYRATION = 0.05  # radius of gyration over length that a link hardly falls below
 _ARMATURES = (5e-3, 20.0)  # armature over what rotor, gear and belt reflect
-_SIZES = ("mass", "length", "com", "inertia", "radius", "ratio", "_torque", "_limit", "_speed")
-"""Ends of the paths of numbers that one robot hardly has ten times of another's."""
-_EXACTLY = 0.01  # of a power of ten, within which a changed number has lost its decimal point
-
 _ROUNDING = 1.001
 _STOPS = {f"{joint}.stop_{end}" for joint in JOINTS for end in ("lower", "upper")}
 
@@ -98,42 +83,28 @@ def doubts_of_inheritance(chain: list[tuple[str, Tree]], resolved: list[Tree]) -
     ``chain`` are the files with their own tables, the root first, ``resolved`` all tables of each.
     """
     for level, (name, own) in enumerate(chain[1:], 1):
-        before = {path: entry["value"] for path, entry in numbers(resolved[level - 1])}
-        for path, entry in numbers(own):
-            value, was = entry["value"], before.get(path, 0.0)
-            power = math.log10(value / was) if value * was > 0 else 0.0
-            if path.endswith(_SIZES) and round(power) and abs(power - round(power)) < _EXACTLY:
-                yield (
-                    f"{name}: '{path}' is {value:g} {entry['unit']}, {10.0 ** round(power):g} times"
-                    f" that of {chain[level - 1][0]}; is its decimal point right?"
-                )
         stated_later = {path for _, tree in chain[level + 1 :] for path, _ in numbers(tree)}
         unfit = unfit_numbers(resolved[level - 1], own)
         unfit = {path: cause for path, cause in unfit.items() if path not in stated_later}
         for cause in dict.fromkeys(unfit.values()):
             belong = [path for path in unfit if unfit[path] == cause]
-            armature = any(path.endswith(".armature") for path in belong)
-            until = " (until then, an armature is what rotor and gear give)" if armature else ""
             yield (
                 f"{name} changes {cause} but not {', '.join(belong)}, inherited from"
-                f" {chain[level - 1][0]}; state each anew, or as it is with your source{until}."
+                f" {chain[level - 1][0]}; state each anew, or as it is with your source (an"
+                " armature that is not stated is what rotor and gear give)."
             )
 
 
 def doubts_of_values(robot: Robot, stated: Tree, origin: str) -> Iterator[str]:
-    """Yield sentences about numbers that look like another unit or are not ``stated``."""
+    """Yield sentences about numbers that are hardly right, or not ``stated``."""
+    limits = dict.fromkeys(
+        ("lower", "upper", "stop_lower", "stop_upper"), (-_WIDEST[robot.kind], _WIDEST[robot.kind])
+    )
+    plausible = {**PLAUSIBLE, **limits}
     for path, entry in numbers(stated):
-        name = path.rpartition(".")[2]
-        low, high = PLAUSIBLE.get(name, (-math.inf, math.inf))
-        if name in ("lower", "upper", "stop_lower", "stop_upper"):
-            low, high = -_WIDEST[robot.kind], _WIDEST[robot.kind]
-        if path.startswith("reality.") or low <= entry["value"] <= high:
-            continue
-        guess = _slip(entry["value"], entry["unit"], low, high)
-        yield (
-            f"{origin}: '{path}' is {entry['value']:g} {entry['unit']} but hardly beyond {low:g} to"
-            f" {high:g}; {guess}?"
-        )
+        low, high = plausible.get(path.rpartition(".")[2], (-math.inf, math.inf))
+        if not path.startswith("reality."):
+            yield from _beyond(origin, path, entry["value"], low, high, entry["unit"])
     balls = (robot.base.radius, robot.knee_cap.radius, robot.foot.radius)
     links = (("thigh", robot.thigh), ("shank", robot.shank))
     for (name, link), above, below in zip(links, balls, balls[1:], strict=False):
@@ -141,51 +112,43 @@ def doubts_of_values(robot: Robot, stated: Tree, origin: str) -> Iterator[str]:
         reach = link.reach + below - link.com
         most = _CROSSWAYS * link.mass * (link.com + above) * reach
         least = link.mass * (_LEAST_GYRATION * link.length) ** 2
-        if least < most and not least <= link.inertia <= most:
-            radius = math.sqrt(link.inertia / link.mass)
-            yield (
-                f"{origin}: '{name}.inertia' is {link.inertia:g} kg m2, a radius of gyration of"
-                f" {radius:.3g} m on a link of {link.length:g} m, whose mass and centre of mass"
-                f" allow {least:.2g} to {most:.2g} kg m2;"
-                f" {_slip(link.inertia, 'kg m2', least, most)}? State '{name}.extent' where a"
-                " weight sticks out."
+        if least < most:
+            remedy = f", or state '{name}.extent' where a weight sticks out"
+            yield from _beyond(
+                origin, f"{name}.inertia", link.inertia, least, most, "kg m2", remedy
             )
-        if link.mass > _HEAVIEST * link.length:
-            yield (
-                f"{origin}: '{name}.mass' is {link.mass:g} kg on {link.length:g} m; "
-                f"{_slip(link.mass, 'kg', 0.0, _HEAVIEST * link.length)}?"
-            )
+        yield from _beyond(origin, f"{name}.mass", link.mass, 0.0, _HEAVIEST * link.length, "kg")
     for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
         ratio = joint.motor.gear_ratio * joint.belt_ratio
-        reflected = joint.motor.rotor_inertia * ratio**2
-        if not _ARMATURES[0] * reflected <= joint.armature <= _ARMATURES[1] * reflected:
-            yield (
-                f"{origin}: '{name}.armature' is {joint.armature:.3g} kg m2, but rotor, gear and"
-                f" belt reflect {reflected:.3g}; is the rotor's inertia that behind the gear?"
-            )
+        low, high = (share * joint.motor.rotor_inertia * ratio**2 for share in _ARMATURES)
+        why = "; rotor, gear and belt reflect about that"
+        yield from _beyond(origin, f"{name}.armature", joint.armature, low, high, "kg m2", why)
+        why = "; the motor gives no more torque"
         for path, torque in (
             (f"{name}.friction", joint.friction),
             (f"{name}.damping", joint.damping * joint.no_load_speed),
         ):
-            if torque > joint.torque_limit:
-                yield (
-                    f"{origin}: '{path}' takes more torque than the motor gives,"
-                    f" {joint.torque_limit:g} N m; check both."
-                )
+            yield from _beyond(origin, path, torque, 0.0, joint.torque_limit, "N m", why)
+    weight, why = robot.mass * GRAVITY, "; the leg would hang on the rail"
+    yield from _beyond(origin, "rail.friction", robot.rail.friction, 0.0, weight, "N", why)
     if robot.kind == "leg" and not _stands(robot):
         yield (
             f"{origin}: within 'hip.lower' to 'knee.upper' the foot never comes below the hip; is a"
             " joint's sign wrong, or does the knee bend forward?"
         )
-    weight = robot.mass * GRAVITY
-    if robot.rail.friction > weight:
-        yield (
-            f"{origin}: 'rail.friction' is {robot.rail.friction:g} N, more than the leg's weight,"
-            f" {weight:.3g}; it would hang on the rail."
-        )
     missing = sorted(_STOPS - {path for path, _ in numbers(stated)})
     if missing and robot.kind == "leg":
         yield f"{origin} does not state {', '.join(missing)}; leg V2's mechanical stops are taken."
+
+
+def _beyond(
+    origin: str, path: str, value: float, low: float, high: float, unit: str, why: str = ""
+) -> Iterator[str]:
+    if not low <= value <= high:
+        yield (
+            f"{origin}: '{path}' is {value:.5g} {unit} but hardly beyond {low:.3g} to {high:.3g}"
+            f" {unit}{why}; check its unit and decimal point."
+        )
 
 
 def _stands(robot: Robot) -> bool:
@@ -194,17 +157,6 @@ def _stands(robot: Robot) -> bool:
     thigh, shank = robot.thigh.length, robot.shank.length
     hip = np.arctan2(-shank * np.sin(knee), thigh + shank * np.cos(knee))
     return bool(np.any((robot.hip.lower <= hip) & (hip <= robot.hip.upper)))
-
-
-def _slip(value: float, unit: str, low: float, high: float) -> str:
-    """Return the likely reason why a value lies beyond bounds, as part of a sentence."""
-    for factor, other in _SLIPS[unit].items():
-        if low <= value * factor <= high:
-            return f"is it in {other}"
-    if unit == "1" and low <= 1 / value <= high:
-        return "is it inverted"
-    powers = [n for n in (1, 2, 3, -1, -2, -3) if low <= value / 10**n <= high]
-    return "is its decimal point right" if powers else "is its unit right"
 
 
 def check_physics(robot: Robot, origin: str) -> None:
@@ -218,88 +170,79 @@ def check_physics(robot: Robot, origin: str) -> None:
 
 
 def _contradictions(robot: Robot) -> Iterator[str]:
-    joints = (("hip", robot.hip), ("knee", robot.knee))
-    for name, joint in joints:
-        peak = joint.motor.peak_torque
-        if joint.lower >= joint.upper:
-            yield (
-                f"'{name}.lower' ({joint.lower:g} rad) must lie below '{name}.upper'"
-                f" ({joint.upper:g})."
-            )
-        for key, inner, outer in (
-            ("lower", joint.stop_lower, joint.lower),
-            ("upper", joint.upper, joint.stop_upper),
-        ):
-            if inner > outer:
-                yield (
-                    f"'{name}.{key}' ({getattr(joint, key):g} rad) lies beyond the mechanical stop"
-                    f" '{name}.stop_{key}' ({getattr(joint, f'stop_{key}'):g});"
-                    f" {'is it in degrees?' if inner - outer > math.tau else 'state both.'}"
-                )
-        for smaller in ("torque_limit", "rated_torque"):
-            limit = getattr(joint.motor, smaller)
-            yield from _above(
-                f"{name}.motor.{smaller}", limit, f"{name}.motor.peak_torque", peak, "N m"
-            )
-        servo, ratio = getattr(robot.hardware, name), joint.motor.gear_ratio
-        current, voltage = f"'hardware.{name}.max_current'", "'hardware.voltage_high'"
-        constant = f"'hardware.{name}.torque_constant' ({servo.torque_constant:g} N m/A)"
-        most = servo.torque_constant * servo.max_current * ratio
-        if peak > most * _ROUNDING:
-            yield (
-                f"'{name}.motor.peak_torque' is {peak:g} N m but {constant} times {current}"
-                f" ({servo.max_current:g} A) and '{name}.motor.gear_ratio' ({ratio:g}) gives"
-                f" {most:.3g} N m at most; {_slip(ratio, '1', 1.0, math.inf)}?"
-            )
-        fastest = speed_constant(servo) * robot.hardware.voltage_high / ratio
-        if (speed := joint.motor.no_load_speed) > fastest * _ROUNDING:
-            yield (
-                f"'{name}.motor.no_load_speed' is {speed:g} rad/s but by"
-                f" {constant} {voltage} ({robot.hardware.voltage_high:g} V) turns it at"
-                f" {fastest:.3g} rad/s at most; {_slip(speed, 'rad/s', 0.0, fastest)}?"
-            )
-        if joint.load_friction >= 1:
-            yield (
-                f"'{name}.load_friction' is {joint.load_friction:g} but a gear that takes all that"
-                " it gets never turns; give less than 1."
-            )
+    if robot.kind not in KINDS:
+        yield f"'kind': {unknown_name('kind of robot', robot.kind, KINDS)}"
+    for name in JOINTS:
+        yield from _joint_contradictions(robot, name)
     for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
         end = f"{name}.{'extent' if link.extent else 'length'}"
         yield from _above(f"{name}.com", link.com, end, link.reach, "m")
-    for name in _STOPS if robot.kind == "leg" else ():
-        if abs(stop := attrgetter(name)(robot)) > 2 * math.pi:
-            yield f"'{name}' is {stop:g} rad but no leg's joint turns more than once, 6.28 rad."
-    if robot.kind not in KINDS:
-        yield f"'kind': {unknown_name('kind of robot', robot.kind, KINDS)}"
-    if robot.kind == "leg" and (robot.knee.lower < -math.pi or robot.knee.upper > 0):
-        yield (
-            "'knee.lower' and 'knee.upper' must lie between -pi and 0 rad, because a leg's knee"
-            " bends to the negative side; for a robot that only swings write kind = 'pendulum'."
-        )
-    reality = robot.reality
-    for (name, joint), drive in zip(joints, (reality.hip, reality.knee), strict=True):
-        if drive.efficiency > 1:
+    if robot.kind == "leg":
+        for name in _STOPS:
+            if abs(stop := attrgetter(name)(robot)) > 2 * math.pi:
+                yield f"'{name}' is {stop:g} rad but no leg's joint turns more than once, 6.28 rad."
+        if robot.knee.lower < -math.pi or robot.knee.upper > 0:
             yield (
-                f"'reality.{name}.efficiency' is {drive.efficiency:g} but no gear gives more than"
-                " it gets; give at most 1."
+                "'knee.lower' and 'knee.upper' must lie between -pi and 0 rad, because a leg's knee"
+                " bends to the negative side; for a robot that only swings write kind = 'pendulum'."
             )
-        if drive.stiction < 1:
-            yield (
-                f"'reality.{name}.stiction' is {drive.stiction:g} but friction at rest is not below"
-                " Coulomb friction; give 1 or more."
-            )
-        if drive.torque_limit is not None:
-            peak = joint.motor.peak_torque * joint.belt_ratio
-            high = f"{name}.motor.peak_torque x belt_ratio"
-            yield from _above(f"reality.{name}.torque_limit", drive.torque_limit, high, peak, "N m")
-    least, ground = 2 * TIMESTEP, reality.ground.time_constant
-    for name, softest in (("reality.ground", ground), ("contact", robot.contact.time_constant)):
+    least = 2 * TIMESTEP
+    why = "two physics steps; MuJoCo would take that instead"
+    for name, softest in (
+        ("reality.ground", robot.reality.ground.time_constant),
+        ("contact", robot.contact.time_constant),
+    ):
         if softest is not None and softest < least:
-            yield (
-                f"'{name}.time_constant' is {softest:g} s but must be at least {least:g} s, two"
-                " physics steps; MuJoCo would silently take that instead."
-            )
+            yield f"'{name}.time_constant' is {softest:g} s; give at least {least:g} s, {why}."
     yield from contradictions(robot.hardware)
+
+
+def _joint_contradictions(robot: Robot, name: str) -> Iterator[str]:
+    joint, servo = attrgetter(name)(robot), getattr(robot.hardware, name)
+    drive, motor = getattr(robot.reality, name), joint.motor
+    if joint.lower >= joint.upper:
+        high = f"'{name}.upper' ({joint.upper:g})"
+        yield f"'{name}.lower' ({joint.lower:g} rad) must lie below {high}."
+    for key, inner, outer in (
+        ("lower", joint.stop_lower, joint.lower),
+        ("upper", joint.upper, joint.stop_upper),
+    ):
+        if inner > outer:
+            yield (
+                f"'{name}.{key}' ({getattr(joint, key):g} rad) lies beyond the mechanical stop"
+                f" '{name}.stop_{key}' ({getattr(joint, f'stop_{key}'):g}); is it in degrees?"
+            )
+    peak, at = motor.peak_torque, f"{name}.motor"
+    for smaller in ("torque_limit", "rated_torque"):
+        yield from _above(
+            f"{at}.{smaller}", getattr(motor, smaller), f"{at}.peak_torque", peak, "N m"
+        )
+    if drive.torque_limit is not None:
+        high = f"{at}.peak_torque x belt_ratio"
+        limit, most = drive.torque_limit, peak * joint.belt_ratio
+        yield from _above(f"reality.{name}.torque_limit", limit, high, most, "N m")
+    constant = f"'hardware.{name}.torque_constant' ({servo.torque_constant:g} N m/A)"
+    most = servo.torque_constant * servo.max_current * motor.gear_ratio
+    if peak > most * _ROUNDING:
+        yield (
+            f"'{at}.peak_torque' is {peak:g} N m but {constant} times 'hardware.{name}.max_current'"
+            f" ({servo.max_current:g} A) and '{at}.gear_ratio' ({motor.gear_ratio:g}) gives"
+            f" {most:.3g} N m at most."
+        )
+    fastest = speed_constant(servo) * robot.hardware.voltage_high / motor.gear_ratio
+    if motor.no_load_speed > fastest * _ROUNDING:
+        yield (
+            f"'{at}.no_load_speed' is {motor.no_load_speed:g} rad/s but by {constant}"
+            f" 'hardware.voltage_high' ({robot.hardware.voltage_high:g} V) turns it at"
+            f" {fastest:.3g} rad/s at most."
+        )
+    for path, wrong, why in (
+        (f"{name}.load_friction", joint.load_friction >= 1, "less than 1, or the gear never turns"),
+        (f"reality.{name}.efficiency", drive.efficiency > 1, "at most 1, as of any gear"),
+        (f"reality.{name}.stiction", drive.stiction < 1, "1 or more, times Coulomb friction"),
+    ):
+        if wrong:
+            yield f"'{path}' is {attrgetter(path)(robot):g}; give {why}."
 
 
 def _above(low_name: str, low: float, high_name: str, high: float, unit: str) -> Iterator[str]:
