@@ -38,7 +38,7 @@ class HopShape:
     """What hops are like, on any leg: see ``hop_law`` for the units.
 
     The defaults have the least scatter, on the shipped legs, of a controller that sees the state
-    late and errs about velocities as a policy does (``studies.mpc``).
+    late and errs about velocities as a policy does.
     """
 
     flight_length: float = 0.68
