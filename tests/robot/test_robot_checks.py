@@ -105,7 +105,7 @@ def test_a_value_in_another_unit_is_doubted_by_its_name(tmp_path, number, data):
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     path=st.sampled_from([f"{k}.{n}" for k in ("thigh", "shank") for n in ("mass", "inertia")]),
-    power=st.sampled_from([-2, -1, 1, 2, 3]),
+    power=st.sampled_from([-3, 2, 3]),
 )
 def test_a_decimal_point_that_slipped_is_doubted(tmp_path, path, power):
     entry = dict(numbers(load_tree("legv2")))[path]

@@ -304,14 +304,13 @@ def test_what_cannot_be_is_refused():
         make_legs(with_reality(hip=DriveMismatch(backlash=0.01)))
 
 
-def perturbed(legs, force=0.0, ground=0.0, ticks=40, **later):
+def perturbed(legs, force=0.0, ground=0.0, ticks=40):
     count = legs.count
     plan = Perturbation(
         (legs.robot,) * count,
         np.zeros((ticks, count, 2)),
         np.full((ticks, count), force),
         np.full((ticks, count), ground),
-        **later,
     )
     return Perturber(plan, legs)
 
@@ -342,17 +341,3 @@ def test_ground_steps_shift_floor_and_clearance_once_the_foot_is_clear(rise):
         perturber.act(tick)
         legs.step(np.zeros((2, 2)))
     assert legs.height[0] < height[0]
-
-
-def test_legs_become_others_at_the_stated_tick():
-    heavy = dataclasses.replace(CAD, base=dataclasses.replace(CAD.base, mass=2 * CAD.base.mass))
-    changed, plain = (make_legs(CAD, 2) for _ in range(2))
-    perturber = perturbed(changed, later=(CAD, heavy), change=10)
-    for legs in (changed, plain):
-        legs.stand(slice(None), POSTURE)
-    for tick in range(20):
-        perturber.act(tick)
-        for legs in (changed, plain):
-            legs.step(np.full((2, 2), [0.0, 4.0]))
-        same = (changed.state == plain.state).all(axis=1)
-        assert same.tolist() == [True, tick < 10]

@@ -23,16 +23,12 @@ class Perturbation:
         force: Upward push on the base, N, (ticks, n).
         ground: Where the ground is to be, m above where it was, (ticks, n); it moves under a leg
             as soon as the foot is clear of it.
-        later: What each leg is from ``change`` on; empty for no change.
-        change: Tick of the change.
     """
 
     robots: tuple[Robot, ...]
     torque: Array
     force: Array
     ground: Array
-    later: tuple[Robot, ...] = ()
-    change: int = 0
 
 
 class Perturber:
@@ -47,8 +43,6 @@ class Perturber:
     def act(self, tick: int) -> None:
         """Let happen what happens at the beginning of a tick."""
         plan, legs = self.perturbation, self.legs
-        if plan.later and tick == plan.change:
-            legs.set_robots(plan.later)
         if (plan.force[tick] != self._force).any():
             self._force = plan.force[tick].copy()
             legs.push(self._force)
