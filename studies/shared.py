@@ -15,7 +15,7 @@ import shlex
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
@@ -23,10 +23,15 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.cli import guard, read_options
-from hopping_leg.cli.options import KEPT, check_outputs, command_line, save_json
+from hopping_leg.cli.options import KEPT, check_outputs, command_line, save_json, show_table
 from hopping_leg.errors import UsageError
-from hopping_leg.io import versions, write_atomically
+from hopping_leg.io import versions, write_atomically, write_json
+from hopping_leg.sim import compile_physics
+from hopping_leg.workers import ProcessWorkers
 from studies import readmes
+
+Row = dict[str, Any]
+"""JSON values by name: a result, or a record of it."""
 
 ROOT = Path(__file__).parent.parent
 
@@ -141,7 +146,47 @@ def _lines(tree: Any, indent: str = "") -> str:  # noqa: ANN401
     return f"{left}\n" + ",\n".join(f"{inner}{part}" for part in parts) + f"\n{indent}{right}"
 
 
-Timed = Callable[[], None]
+def once(file: Path, asked: Row, work: Callable[..., Row], *arguments: object) -> Row:
+    """Return what a file keeps of the same work, or do it and keep its result there.
+
+    Args:
+        file: JSON file.
+        asked: All that the result depends on, as JSON values.
+        work: Returns the result, JSON values too.
+        arguments: Of the work.
+    """
+    asked = json.loads(json.dumps(asked))
+    kept = json.loads(file.read_bytes()) if file.exists() else {}
+    if kept.get("asked") != asked:
+        print(f"{file.stem} ...", flush=True)
+        kept = {"asked": asked, "result": work(*arguments)}
+        write_json(file, kept)
+        kept = json.loads(file.read_bytes())
+    result: Row = kept["result"]
+    return result
+
+
+def do_all(jobs: Iterable[tuple[Any, ...]], at_once: int = 1) -> list[Row]:
+    """Return the results of jobs, each the arguments of ``once``, in processes if several."""
+    compile_physics()  # once, before the processes
+    with ProcessWorkers(at_once) as workers:
+        return workers.map(once, jobs)
+
+
+def show_numbers(title: str, numbers: Row) -> None:
+    """Print the numbers of a result, those of its parts under dotted names."""
+    show_table(("number", "value"), ((k, f"{v:.4g}") for k, v in _numbers(numbers)), title)
+
+
+def _numbers(tree: Row, start: str = "") -> Iterator[tuple[str, float]]:
+    for name, value in tree.items():
+        if isinstance(value, dict):
+            yield from _numbers(value, f"{start}{name}.")
+        elif isinstance(value, int | float):
+            yield f"{start}{name}", value
+
+
+Timed = Callable[[], object]
 
 
 def seconds(function: Timed) -> float:
@@ -151,38 +196,16 @@ def seconds(function: Timed) -> float:
     return time.perf_counter() - start
 
 
-def interleave(
-    functions: Mapping[str, Timed],
-    repeats: int,
-    on_repeat: Callable[[int, int], None] | None = None,
-) -> dict[str, Array]:
-    """Time functions in turn, again and again.
+def interleave(functions: Mapping[str, Timed], repeats: int) -> dict[str, Array]:
+    """Return the seconds of functions that are timed in turn, by name, (repeats,).
 
-    Args:
-        functions: What to time, by name.
-        repeats: Rounds.
-        on_repeat: Called with (rounds done, rounds in all), for progress bars.
-
-    Returns:
-        Seconds by name, (repeats,); the first, cold round is not in it.
+    The first, cold round is not in it.
     """
-    for function in functions.values():
-        function()
-    taken: dict[str, list[float]] = {name: [] for name in functions}
-    for done in range(repeats):
-        for name, function in functions.items():
-            taken[name].append(seconds(function))
-        if on_repeat is not None:
-            on_repeat(done + 1, repeats)
-    return {name: np.array(values) for name, values in taken.items()}
+    rounds = [{name: seconds(work) for name, work in functions.items()} for _ in range(repeats + 1)]
+    return {name: np.array([taken[name] for taken in rounds[1:]]) for name in functions}
 
 
-def median_ratio(numerator: Array, denominator: Array) -> float:
-    """Return the median over rounds of the ratio of two durations."""
-    return float(np.median(numerator / denominator))
-
-
-def host() -> dict[str, Any]:
+def host() -> Row:
     """Return what a timing depends on: processor, load, versions."""
     return {
         "cores": os.cpu_count(),

@@ -1,4 +1,4 @@
-"""A browser without a screen, driven from here: for the test and the benchmark of the page."""
+"""A browser without a screen, driven from here: for the tests and the benchmark of the page."""
 
 import contextlib
 import shutil
@@ -32,9 +32,6 @@ PATIENCE = 120_000.0
 SIZE = (1280, 800)
 """Of the window, pixels."""
 
-SMALL_SIZE = (900, 600)
-"""Of a window in which a software renderer has few pixels to draw."""
-
 
 def find_chromium() -> str | None:
     """Return the path of a Chromium, None if there is none."""
@@ -59,13 +56,11 @@ def chromium() -> Iterator["Browser"]:
     """Start a browser with an empty profile.
 
     Raises:
-        UsageError: There is no Chromium, or the page in it did not answer in time.
+        UsageError: There is no Chromium.
     """
-    from playwright.sync_api import TimeoutError as TooLate
     from playwright.sync_api import sync_playwright
 
-    path = find_chromium()
-    if path is None:
+    if (path := find_chromium()) is None:
         raise UsageError(
             f"There is no browser; install Chromium, known as one of: {', '.join(_NAMES)}."
         )
@@ -75,12 +70,6 @@ def chromium() -> Iterator["Browser"]:
         )
         try:
             yield browser
-        except TooLate as error:
-            waited_for = error.message.splitlines()[-1].strip(" -")
-            raise UsageError(
-                f"The page did not answer within {1e-3 * PATIENCE:g} s ({waited_for}); try again"
-                " when the computer is less busy."
-            ) from error
         finally:
             browser.close()
 

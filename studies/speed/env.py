@@ -6,26 +6,21 @@ thread, for the plain leg, and the stepper with every effect of the twin. All si
 motion, so that their ratios are what physics, noise, delay, reward and observation cost.
 """
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import gymnasium
 import mujoco
 import numpy as np
 from mujoco import batch
-from rich.progress import Progress
-from rich.table import Table
 
 from hopping_leg.arrays import Array
-from hopping_leg.cli.options import at_least
+from hopping_leg.cli.options import JsonFile, RobotFile, at_least
 from hopping_leg.envs import HoppingEnv, HoppingTask, TaskConfig, paper_reward
 from hopping_leg.robot import COARSE_TIMESTEP, DEFAULT_ROBOT, build_model, load_robot
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.sim import LegSimulator
-from hopping_leg.terminal import plain_console
-from studies.shared import Timed, host, interleave, median_ratio
+from studies.shared import Row, Timed, host, interleave, show_numbers
 
 _BENT, _STRETCHED = 0.55, 0.8
 """Leg lengths of the recorded motion over the straight leg's."""
@@ -41,8 +36,7 @@ _STIFFNESS, _DAMPING = 40.0, 1.0
 class Env:
     """Time the environment against bare physics and Gymnasium's Hopper-v5."""
 
-    robot: str = DEFAULT_ROBOT
-    """A shipped name or the path of a .toml file."""
+    robot: RobotFile = DEFAULT_ROBOT
     count: int = 512
     """Legs of the batched environment."""
     ticks: int = 50
@@ -57,19 +51,78 @@ class Env:
     """Physics step, s."""
     seed: int = 0
     """Of noise and delay."""
-    json: Path | None = None
-    """Write every number to this file."""
+    json: JsonFile = None
 
-    def measure(self) -> dict[str, Any]:
-        """Run it, print a table, return every number."""
+    def measure(self) -> Row:
+        """Time everything in turn, print and return every number.
+
+        Times of the stepper and of MuJoCo are those of a physics step per leg and thread.
+        """
         at_least(1, count=self.count, repeats=self.repeats)
         at_least(1, ticks=self.ticks, single_ticks=self.single_ticks)
-        at_least(0, threads=self.threads, seed=self.seed)
-        with Progress(transient=True) as bar:
-            task = bar.add_task("timing", total=self.repeats)
-            result = bench_env(self, lambda done, _: bar.update(task, completed=done))
-        _print("Environment with noise and delay", result)
+        functions, substeps = self._functions()
+        steps = dict.fromkeys(functions, self.count * self.ticks)
+        steps |= dict.fromkeys(("single_env", "hopper_v5"), self.single_ticks)
+        taken = {k: t / steps[k] for k, t in interleave(functions, self.repeats).items()}
+        typical = {name: float(np.median(times)) for name, times in taken.items()}
+
+        def ratio(over: str, under: str) -> float:
+            return float(np.median(taken[over] / taken[under]))
+
+        result = {
+            "stepper_step_s": typical["stepper"] / substeps,
+            "stepper_with_effects_step_s": typical["stepper_with_effects"] / substeps,
+            "mujoco_batch_step_s": typical["mujoco_batch"] / substeps,
+            "stepper_over_mujoco": ratio("mujoco_batch", "stepper"),
+            "stepper_with_effects_over_mujoco": ratio("mujoco_batch", "stepper_with_effects"),
+            "batched_env_steps_per_s": 1 / typical["batched_env"],
+            "batched_env_overhead_s": float(
+                np.median(taken["batched_env"] - taken["batched_physics"])
+            ),
+            "single_env_step_s": typical["single_env"],
+            "single_env_over_hopper_v5": ratio("hopper_v5", "single_env"),
+            "batched_env_over_hopper_v5": ratio("hopper_v5", "batched_env"),
+            "setup": {
+                "robot": load_robot(self.robot).name,
+                "legs": self.count,
+                "threads": self.threads,
+                "repeats": self.repeats,
+                "timestep_s": self.timestep,
+                "substeps": substeps,
+                "noise_and_delay": True,
+            },
+            "host": host(),
+        }
+        show_numbers("Environment with noise and delay", result)
         return result
+
+    def _functions(self) -> tuple[dict[str, Timed], int]:
+        """Return what is timed, and the physics steps of a control period."""
+        robot, rng = load_robot(self.robot), np.random.default_rng(self.seed)
+        hip, knee = robot.of_joints("torque_limit").tolist()
+        options = TaskConfig(action_torque=(hip, knee), timestep=self.timestep, episode=3600.0)
+        task = HoppingTask(robot, self.count, options, paper_reward(robot), rng, self.threads)
+        many = record(task, self.ticks)
+        env = HoppingEnv(robot, options)
+        env.reset(seed=self.seed)
+        one = record(env.task, self.single_ticks)
+        bare, plain, twin = (
+            LegSimulator(leg, self.count, timestep=self.timestep, threads=threads)
+            for leg, threads in ((robot, self.threads), (robot, 1), (load_robot("twin"), 1))
+        )
+        hopper = gymnasium.make(
+            "Hopper-v5", frame_skip=bare.substeps, terminate_when_unhealthy=False
+        ).unwrapped
+        hopper.reset(seed=self.seed)
+        return {
+            "batched_env": lambda: _run_task(task, many),
+            "batched_physics": lambda: _run_legs(bare, many),
+            "stepper": lambda: _run_legs(plain, many),
+            "stepper_with_effects": lambda: _run_legs(twin, many),
+            "mujoco_batch": _mujoco_batch(plain, many),
+            "single_env": lambda: _run_env(env, one),
+            "hopper_v5": lambda: _run_hopper(hopper, self.single_ticks),
+        }, bare.substeps
 
 
 @dataclass(frozen=True)
@@ -85,99 +138,6 @@ class Motion:
     actions: Array
     torques: Array
     start: dict[str, Any]
-
-
-def bench_env(
-    benchmark: Env, on_repeat: Callable[[int, int], None] | None = None
-) -> dict[str, Any]:
-    """Time everything in one run, alternating.
-
-    Returns:
-        Times of a physics step per leg and thread, s, their ratios, throughput of the batched and
-        time of the single environment, ratios to Hopper-v5.
-    """
-    functions, steps = _functions(benchmark)
-    taken = interleave(functions, benchmark.repeats, on_repeat)
-    per_step = {name: taken[name] / steps[name] for name in taken}
-    typical = {name: float(np.median(times)) for name, times in per_step.items()}
-    substeps = _substeps(benchmark)
-    return {
-        "stepper_step_s": typical["stepper"] / substeps,
-        "stepper_with_effects_step_s": typical["stepper_with_effects"] / substeps,
-        "mujoco_batch_step_s": typical["mujoco_batch"] / substeps,
-        "stepper_over_mujoco": median_ratio(per_step["mujoco_batch"], per_step["stepper"]),
-        "stepper_with_effects_over_mujoco": median_ratio(
-            per_step["mujoco_batch"], per_step["stepper_with_effects"]
-        ),
-        "batched_env_steps_per_s": 1 / typical["batched_env"],
-        "batched_env_overhead_s": float(
-            np.median(per_step["batched_env"] - per_step["batched_physics"])
-        ),
-        "single_env_step_s": typical["single_env"],
-        "single_env_over_hopper_v5": median_ratio(per_step["hopper_v5"], per_step["single_env"]),
-        "batched_env_over_hopper_v5": median_ratio(per_step["hopper_v5"], per_step["batched_env"]),
-        "setup": _setup(benchmark),
-        "host": host(),
-    }
-
-
-def _substeps(benchmark: Env) -> int:
-    return round(1 / (_options(benchmark).rate * benchmark.timestep))
-
-
-def _setup(benchmark: Env) -> dict[str, Any]:
-    return {
-        "robot": load_robot(benchmark.robot).name,
-        "legs": benchmark.count,
-        "threads": benchmark.threads,
-        "repeats": benchmark.repeats,
-        "timestep_s": benchmark.timestep,
-        "substeps": _substeps(benchmark),
-        "noise_and_delay": True,
-    }
-
-
-def _options(benchmark: Env) -> TaskConfig:
-    limits = load_robot(benchmark.robot).of_joints("torque_limit")
-    return TaskConfig(
-        action_torque=(float(limits[0]), float(limits[1])),
-        timestep=benchmark.timestep,
-        episode=3600.0,
-    )
-
-
-def _functions(benchmark: Env) -> tuple[Mapping[str, Timed], Mapping[str, int]]:
-    """Return what is timed and how many control periods of one leg each call simulates."""
-    robot, options = load_robot(benchmark.robot), _options(benchmark)
-    rng = np.random.default_rng(benchmark.seed)
-    reward = paper_reward(robot)
-    task = HoppingTask(robot, benchmark.count, options, reward, rng, benchmark.threads)
-    many = record(task, benchmark.ticks)
-    env = HoppingEnv(robot, options)
-    env.reset(seed=benchmark.seed)
-    one = record(env.task, benchmark.single_ticks)
-    bare = LegSimulator(
-        robot, benchmark.count, timestep=benchmark.timestep, threads=benchmark.threads
-    )
-    plain = LegSimulator(robot, benchmark.count, timestep=benchmark.timestep, threads=1)
-    twin = LegSimulator(load_robot("twin"), benchmark.count, timestep=benchmark.timestep, threads=1)
-    leg = gymnasium.make(
-        "Hopper-v5", frame_skip=bare.substeps, terminate_when_unhealthy=False
-    ).unwrapped
-    leg.reset(seed=benchmark.seed)
-    functions = {
-        "batched_env": lambda: _run_task(task, many),
-        "batched_physics": lambda: _run_legs(bare, many),
-        "stepper": lambda: _run_legs(plain, many),
-        "stepper_with_effects": lambda: _run_legs(twin, many),
-        "mujoco_batch": _mujoco_batch(plain, many),
-        "single_env": lambda: _run_env(env, one),
-        "hopper_v5": lambda: _run_hopper(leg, benchmark.single_ticks),
-    }
-    of_one = {"single_env": benchmark.single_ticks, "hopper_v5": benchmark.single_ticks}
-    return functions, {
-        name: of_one.get(name, benchmark.count * benchmark.ticks) for name in functions
-    }
 
 
 def record(task: HoppingTask, ticks: int) -> Motion:
@@ -240,11 +200,3 @@ def _run_hopper(leg: Any, ticks: int) -> None:  # noqa: ANN401
     leg.reset()
     for action in leg.np_random.uniform(-1, 1, (ticks, 3)):
         leg.step(action)
-
-
-def _print(title: str, result: dict[str, Any]) -> None:
-    table = Table("number", "value", title=title)
-    for name, value in result.items():
-        if isinstance(value, int | float):
-            table.add_row(name, f"{value:,.4g}" if value < 100 else f"{value:,.0f}")
-    plain_console().print(table)
