@@ -47,7 +47,7 @@ SECONDS = {
 ELSEWHERE = {
     **dict.fromkeys(
         ("hop evaluate runs/my_leg/gains.toml", "hop evaluate runs/heron/tuned/gains.toml"),
-        "minutes of search before: studies/tests/test_gain_tuning.py",
+        "minutes of search before: studies/tests/test_energy_shaping.py",
     ),
     "hop reproduce": "minutes even with --quick: tests/cli/test_reproduce.py",
 }

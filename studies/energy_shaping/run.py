@@ -1,16 +1,14 @@
 """How well energy shaping hops: the law as printed, the tuned one, and what each part is worth."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import polars as pl
-from rich.progress import Progress
-from rich.table import Table
+from rich.progress import track
 
-from hopping_leg.cli.options import at_least
+from hopping_leg.cli.options import JsonFile, RobotFile, at_least, mm, show_table
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.energy_shaping import paper_energy_shaping, tuned_energy_shaping
 from hopping_leg.controllers.energy_shaping.controller import EnergyShaping
@@ -25,8 +23,8 @@ from hopping_leg.evaluate.metrics import (
 )
 from hopping_leg.robot import DEFAULT_ROBOT, TIMESTEP, Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, NoiseAndDelay
-from hopping_leg.terminal import plain_console
 from hopping_leg.trace import Trace
+from studies.shared import Row
 
 COMMANDS = (0.25, 0.30, 0.35)
 """The paper's heights, m."""
@@ -130,10 +128,9 @@ def _heavier(robot: Robot, share: float) -> Robot:
 
 @dataclass(frozen=True)
 class Baseline:
-    """Judge energy shaping: the printed law, the tuned one, what each part is worth."""
+    """Measure energy shaping: the printed law, the tuned one, what each part is worth."""
 
-    robot: str = DEFAULT_ROBOT
-    """A shipped name or the path of a .toml file."""
+    robot: RobotFile = DEFAULT_ROBOT
     runs: int = 6
     """Realisations of noise and delay per command."""
     duration: float = 12.0
@@ -142,82 +139,59 @@ class Baseline:
     """Of noise and delay; those from 1000 on have tuned nothing."""
     threads: int = 0
     """Threads of the physics, 0 for all cores; results do not depend on it."""
-    json: Path | None = None
-    """Write every number to this file."""
+    json: JsonFile = None
 
-    def measure(self) -> dict[str, Any]:
-        """Run it, print a table, return every number."""
+    def measure(self) -> Row:
+        """Try every case, print a table, return every number.
+
+        ``cases`` has a record each, ``commands`` one per case and command, ``estimators`` the
+        errors of the apex estimates.
+        """
         at_least(1, runs=self.runs)
-        at_least(0, threads=self.threads, seed=self.seed)
         if not 4 <= self.duration <= 600:
             raise UsageError(f"--duration is {self.duration} s but must lie between 4 and 600 s.")
-        with Progress(transient=True) as bar:
-            task = bar.add_task("hopping", total=None)
-            result = run(self, lambda done, total: bar.update(task, completed=done, total=total))
-        table = Table("case", "median error, mm", "std, mm", "hops/s", "skipped", "body contacts")
-        for row in result["cases"]:
-            sizes = [row["mean_abs_median_error_m"], row["mean_std_m"]]
-            numbers = ["-" if x is None else f"{1e3 * x:.1f}" for x in sizes]
-            numbers += [
-                f"{row['hop_rate_hz']:.2f}",
-                f"{row['skipped_hops']}",
-                f"{row['body_contacts']}",
+        robot = load_robot(self.robot)
+        overall, single, estimators = [], [], []
+        for case in track(cases(robot), "hopping", transient=True):
+            traces = self._hop(case)
+            rows = [
+                _row(case, c, [measure(t)[0] for t in traces[i * self.runs : (i + 1) * self.runs]])
+                for i, c in enumerate(case.commands)
             ]
-            table.add_row(row["case"], *numbers)
-        plain_console().print(table)
-        return result
+            overall.append(summary(case, rows))
+            single += rows
+            if case.name in ("tuned", "paper"):
+                estimators += _estimators(case, traces)
+        show_table(
+            ("case", "median error, mm", "std, mm", "hops/s", "skipped", "body contacts"),
+            (
+                (r["case"], mm(r["mean_abs_median_error_m"]), mm(r["mean_std_m"]),
+                 f"{r['hop_rate_hz']:.2f}", r["skipped_hops"], r["body_contacts"])
+                for r in overall
+            ),
+        )  # fmt: skip
+        return {
+            "robot": robot.name,
+            "seed": self.seed,
+            "runs_per_command": self.runs,
+            "exponent": float(tuned_energy_shaping(robot).gains.exponent),
+            "seconds": self.duration,
+            "timestep_s": TIMESTEP,
+            "cases": overall,
+            "commands": single,
+            "estimators": estimators,
+        }
+
+    def _hop(self, case: Case) -> list[Trace]:
+        """Return one trace per command and run, commands in the outer order."""
+        rate = 1 / case.controller.period
+        setup = RolloutConfig(case.robot, case.disturbance, rate=rate, threads=self.threads)
+        commands = np.tile(np.repeat(case.commands, self.runs), (round(self.duration * rate), 1))
+        run = rollout(case.controller, setup, commands, self.seed)
+        return [run.trace(leg) for leg in range(commands.shape[1])]
 
 
-def run(study: Baseline, on_case: Callable[[int, int], None] | None = None) -> dict[str, Any]:
-    """Try every case.
-
-    Args:
-        study: On which leg, how often and how long.
-        on_case: Called with (cases done, cases in all).
-
-    Returns:
-        ``cases``, one record each; ``commands``, one record per case and command;
-        ``estimators``, errors of the apex estimates.
-    """
-    robot = load_robot(study.robot)
-    todo, runs = cases(robot), study.runs
-    overall, single, estimators = [], [], []
-    for index, case in enumerate(todo):
-        traces = _hop(case, study)
-        rows = [
-            _row(case, c, [measure(t)[0] for t in traces[i * runs : (i + 1) * runs]])
-            for i, c in enumerate(case.commands)
-        ]
-        overall.append(_summary(case, rows))
-        single += rows
-        if case.name in ("tuned", "paper"):
-            estimators += _estimators(case, traces)
-        if on_case is not None:
-            on_case(index + 1, len(todo))
-    return {
-        "robot": robot.name,
-        "seed": study.seed,
-        "runs_per_command": runs,
-        "exponent": float(tuned_energy_shaping(robot).gains.exponent),
-        "seconds": study.duration,
-        "timestep_s": TIMESTEP,
-        "cases": overall,
-        "commands": single,
-        "estimators": estimators,
-    }
-
-
-def _hop(case: Case, study: Baseline) -> list[Trace]:
-    """Return one trace per command and run, commands in the outer order."""
-    controller = case.controller
-    rate = 1 / controller.period
-    setup = RolloutConfig(case.robot, case.disturbance, rate=rate, threads=study.threads)
-    commands = np.tile(np.repeat(case.commands, study.runs), (round(study.duration * rate), 1))
-    run = rollout(controller, setup, commands, study.seed)
-    return [run.trace(leg) for leg in range(commands.shape[1])]
-
-
-def _row(case: Case, command: float, windows: Sequence[HopWindow]) -> dict[str, Any]:
+def _row(case: Case, command: float, windows: Sequence[HopWindow]) -> Row:
     apex, error = pooled_apexes(windows), float(np.median(np.concatenate(errors_of(windows))))
     settled = sum(w.settled for w in windows)
     return {
@@ -235,7 +209,7 @@ def _row(case: Case, command: float, windows: Sequence[HopWindow]) -> dict[str, 
     }
 
 
-def _summary(case: Case, rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def summary(case: Case, rows: Sequence[Row]) -> Row:
     """Average errors over the paper's three commands, spreads over those with hops; rest: all."""
     core = [row for row in rows if row["command_m"] in COMMANDS]
     errors = [abs(row["median_error_m"]) for row in core]
@@ -253,7 +227,7 @@ def _summary(case: Case, rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def _estimators(case: Case, traces: Sequence[Trace]) -> list[dict[str, Any]]:
+def _estimators(case: Case, traces: Sequence[Trace]) -> list[Row]:
     """Return the errors of the calibrated and of both raw apex estimates."""
     columns = {
         "as used": ESTIMATED_APEX,
@@ -262,19 +236,8 @@ def _estimators(case: Case, traces: Sequence[Trace]) -> list[dict[str, Any]]:
     }
     rows = []
     for name, column in columns.items():
-        errors = np.concatenate([apex_errors(_estimating(t, column)) for t in traces])
-        rows.append(
-            {
-                "case": case.name,
-                "estimate": name,
-                "mean_m": float(np.mean(errors)),
-                "std_m": float(np.std(errors)),
-                "hops": len(errors),
-            }
-        )
+        shown = (t.table.with_columns(pl.col(column).alias(ESTIMATED_APEX)) for t in traces)
+        errors = np.concatenate([apex_errors(Trace(table, {})) for table in shown])
+        spread = {"mean_m": float(np.mean(errors)), "std_m": float(np.std(errors))}
+        rows.append({"case": case.name, "estimate": name, **spread, "hops": len(errors)})
     return rows
-
-
-def _estimating(trace: Trace, column: str) -> Trace:
-    table = trace.table.with_columns(pl.col(column).alias(ESTIMATED_APEX))
-    return Trace(table, trace.header)

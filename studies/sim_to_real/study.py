@@ -19,8 +19,7 @@ from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes import Randomise, change, get_recipe, randomise
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim.randomization import RANDOMIZABLE, Range
-from studies.energy_shaping.tuning import Search as GainSearch
-from studies.energy_shaping.tuning import tune
+from studies.energy_shaping.tune import Tune
 from studies.sim_to_real.jobs import StoredJob
 from studies.sim_to_real.policies import COMMANDS, FIRST_SEED, HopTrial, TrainPolicy
 from studies.sim_to_real.twins import (
@@ -245,7 +244,7 @@ def interval_ranges(parameters: Sequence[dict[str, Any]]) -> tuple[Range, ...]:
     return tuple(found)
 
 
-_SEARCH = GainSearch(threads=1)
+_SEARCH = Tune(start=ENERGY_SHAPING, threads=1)
 
 
 @dataclass(frozen=True)
@@ -266,16 +265,13 @@ class TuneGains(StoredJob):
         return {
             "robot": load_robot(self.source).digest,
             "start": asdict(load_gains(ENERGY_SHAPING).gains),
-            **io.plain(asdict(_SEARCH)),
+            **{n: vars(_SEARCH)[n] for n in ("generations", "population", "seconds")},
         }
 
     def run(self, *, quiet: bool) -> None:
         """Search; a search that was killed goes on."""
         folder = self.file.with_suffix("")
-        found = tune(
-            load_robot(self.source), self.source, ENERGY_SHAPING, _SEARCH, 0, folder,
-            lambda generations, lowest: None,
-        )  # fmt: skip
+        found = replace(_SEARCH, robot=self.source, out=folder).find()
         io.write_json(self.file.with_suffix(".json"), {"asked": self.asked, **found})
         (folder / "gains.toml").replace(self.file)
 

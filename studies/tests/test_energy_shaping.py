@@ -1,14 +1,31 @@
-"""Parts of energy shaping are taken away one at a time, on one leg and with one noise."""
+"""Parts of energy shaping are taken away one at a time; gains are searched where costs are low."""
 
+import json
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
+from hopping_leg.controllers import RolloutConfig
+from hopping_leg.controllers.energy_shaping.gains import (
+    GainFile,
+    ShapingGains,
+    load_gains,
+    save_gains,
+    scale_gains,
+)
+from hopping_leg.errors import UsageError
 from hopping_leg.robot import DEFAULT_ROBOT, load_robot
 from studies.energy_shaping import run as module
+from studies.energy_shaping import tune
 from studies.energy_shaping.run import COMMANDS, RANGE, Baseline, cases
+from studies.energy_shaping.tune import Tune, calibrated, cost, from_unit, to_unit
 from studies.shared import main
 
 ROBOT = load_robot("legv2-paper")
 TRUE = "paper, true contact and height"
+GAINS = load_gains().gains
+SETUP = RolloutConfig(ROBOT, threads=1)
 
 
 def measured(monkeypatch, *names):
@@ -36,7 +53,6 @@ def test_the_law_itself_meets_the_commands_and_a_push_until_contact_is_lost_does
     assert law["skipped_hops"] == 0
     assert late["mean_abs_median_error_m"] > 3 * law["mean_abs_median_error_m"]
     assert [row["command_m"] for row in found["commands"]] == [*COMMANDS, *COMMANDS]
-    assert not found["estimators"], "the law with the truth estimates nothing"
 
 
 def test_the_tuned_case_tells_of_more_heights_and_of_its_estimates(monkeypatch):
@@ -45,7 +61,6 @@ def test_the_tuned_case_tells_of_more_heights_and_of_its_estimates(monkeypatch):
     used, raw, _ = found["estimators"]
     assert used["estimate"] == "as used"
     assert abs(used["mean_m"]) < abs(raw["mean_m"])
-    assert found == measured(monkeypatch, "tuned")
 
 
 def test_errors_are_those_of_the_papers_heights_and_faults_those_of_all():
@@ -55,7 +70,7 @@ def test_errors_are_those_of_the_papers_heights_and_faults_those_of_all():
         for c in RANGE
     ]
     rows[-2] |= {"hops": 0, "std_m": None}
-    found = module._summary(cases(ROBOT)[0], rows)
+    found = module.summary(cases(ROBOT)[0], rows)
     assert found["mean_abs_median_error_m"] == pytest.approx((0.02 + 0.03 + 0.08) / 3)
     assert found["worst_median_error_m"] == pytest.approx(0.08)
     assert found["mean_std_m"] == pytest.approx(0.03)
@@ -63,7 +78,82 @@ def test_errors_are_those_of_the_papers_heights_and_faults_those_of_all():
     assert found["commands_without_hops"] == 1
 
 
-def test_a_senseless_duration_is_refused(capsys):
-    assert main("energy_shaping", Baseline, ["--duration", "3"]) == 2
-    assert main("energy_shaping", Baseline, ["--runs", "0"]) == 2
-    assert capsys.readouterr().err.count("must") == 2
+def scores(shift=0.0, scale=1.0, **changed):
+    usual = tune.CommandScore(0.3, 0.3, 0.002, 2.0, 0.4, 0.03, 0.08)
+    medians = {c: 0.3 + shift + scale * (c - 0.3) for c in Tune().commands}
+    return [replace(usual, **{"command": c, "median": m} | changed) for c, m in medians.items()]
+
+
+def test_unit_cube_round_trip_and_shipped_gains_lie_in_the_box():
+    point = np.linspace(0.1, 0.9, len(tune.SPACE))
+    np.testing.assert_allclose(to_unit(from_unit(point, GAINS)), point)
+    assert vars(from_unit(to_unit(GAINS), GAINS)) == pytest.approx(vars(GAINS))
+
+
+def test_cost_ignores_what_calibration_removes_and_counts_the_rest():
+    assert cost(scores(shift=0.02, scale=0.9)) == pytest.approx(cost(scores()))
+    for worse in ({"std": 0.010}, {"rate": 0.5}, {"knee_clearance": -0.01}):
+        assert cost(scores(**worse)) > cost(scores()) + 7, worse
+    assert cost(scores(median=float("nan"))) > 100
+    assert cost(scores(flight=0.3), 0.5) == pytest.approx(cost(scores()) + 20)
+    found = calibrated(GAINS, scores(shift=0.01, scale=1.1))
+    assert found.height_scale == pytest.approx(1.1 * GAINS.height_scale)
+    assert found.height_offset == pytest.approx(0.01 + 1.1 * GAINS.height_offset)
+
+
+def test_a_search_goes_down_and_on_where_it_was(tmp_path, monkeypatch):
+    seeds = []
+
+    def fake(candidates, setup, commands, seconds, seed):
+        seeds.append(seed)
+        return [scores(std=abs(g.exponent - 1.0) + 0.001) for g in candidates]
+
+    monkeypatch.setattr(tune, "evaluate", fake)
+    start, search = replace(GAINS, exponent=1.9), Tune(generations=15, seed=3, out=tmp_path)
+    found = search.search(start, SETUP)
+    assert abs(found.exponent - 1.0) < 0.3
+    (tmp_path / "generations" / "7.json").unlink()
+    seeds.clear()
+    assert search.search(start, SETUP) == found
+    assert seeds == [7]
+
+
+def test_candidates_are_judged_side_by_side():
+    useless = replace(GAINS, k0=0.3, exponent=0.0)
+    commands = (0.25, 0.30, 0.35)
+    good, bad = tune.evaluate([GAINS, useless], SETUP, commands, 3.5, 0)
+    assert cost(good) < cost(bad)
+    assert tuple(score.command for score in good) == commands
+
+
+def test_the_command_writes_gains_that_say_how_they_were_found(tmp_path):
+    words = ["--robot", "legv2", "--generations", "1", "--population", "4", "--seconds", "3"]
+    words += ["--commands", "0.22", "0.3", "0.35", "--out", str(tmp_path)]
+    assert main("energy_shaping.tune", Tune, [*words, "--json", str(tmp_path / "t.json")]) == 0
+    found, stored = (
+        json.loads((tmp_path / "t.json").read_text()),
+        load_gains(tmp_path / "gains.toml"),
+    )
+    assert vars(stored.gains) == pytest.approx(found["gains"])
+    assert stored.robot == "legv2"
+    assert "energy_shaping.tune --robot legv2 --generations 1" in stored.source
+    assert main("energy_shaping.tune", Tune, ["--commands", "0.2", "0.3"]) == 2
+
+
+def test_gains_survive_a_file_and_a_bad_one_is_named(tmp_path):
+    stored = GainFile("legv2", 'a "quoted" search', ShapingGains(k0=1.25, exponent=0.5))
+    save_gains(tmp_path / "g.toml", stored)
+    assert load_gains(tmp_path / "g.toml") == stored
+    (tmp_path / "g.toml").write_text('robot = "a"\nsource = "b"\n[gains]\nk_0 = 1.0')
+    for name, said in (("g.toml", "g.toml.*k_0"), ("missing.toml", r"energy_shaping\.tune")):
+        with pytest.raises(UsageError, match=said):
+            load_gains(tmp_path / name)
+
+
+def test_forces_scale_with_mass_alone_and_on_the_same_leg_nothing_changes():
+    heavy = replace(ROBOT.base, mass=ROBOT.base.mass + ROBOT.mass)
+    assert vars(scale_gains(GAINS, ROBOT, ROBOT)) == pytest.approx(vars(GAINS))
+    scaled = scale_gains(GAINS, ROBOT, replace(ROBOT, base=heavy))
+    assert scaled.touchdown_stiffness == pytest.approx(2 * GAINS.touchdown_stiffness)
+    assert scaled.liftoff_length == pytest.approx(GAINS.liftoff_length)
+    assert scaled.knee_stiffness == pytest.approx(GAINS.knee_stiffness)

@@ -9,7 +9,7 @@ import pytest
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.robot import load_robot, load_tree, robot_text
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES
-from studies.energy_shaping.tuning import Search as GainSearch
+from studies.energy_shaping.tune import Tune
 from studies.sim_to_real.twins import simulated
 from studies.tests.test_transfer_tables import trials
 
@@ -188,7 +188,11 @@ def test_energy_shaping_hops_without_a_training_once_per_twin(tmp_path):
 
 
 def test_gains_are_tuned_on_what_was_identified_and_hop_on_the_twin(tmp_path, monkeypatch):
-    monkeypatch.setattr(study_module, "_SEARCH", GainSearch(1, 4, 3.0, threads=1))
+    monkeypatch.setattr(
+        study_module,
+        "_SEARCH",
+        Tune(start="energy-shaping", generations=1, population=4, seconds=3.0, threads=1),
+    )
     one = study(tmp_path, ("energy-shaping", "energy-shaping-tuned"))
     found = load_tree("legv2") | {"name": "found"}
     for tuning in one.tunings():
