@@ -1,19 +1,16 @@
 """Run the paper's sim-to-real experiment on twins: record, identify, train, hop; or foretell.
 
 A twin plays the real leg: it differs from the CAD in what a fit can find and in what no fit knows.
-It is recorded, identified from the recordings alone, a policy is trained on what was identified,
-and hops on the twin without tuning; beside it policies trained on the CAD's robot, on the paper's
-Table I, and with domain randomisation. What trainings add, luck included, is left out by
-`prediction`: there the simulations only foretell how high a shipped policy hops on the twins, so
-that ways to identify can be compared by their fits alone. Every stage's results stay in the folder:
-the same command goes on after an interruption, and further methods, twins or seeds add to what is
-there. In `zero-shot` controllers hop on legs that they have never met, without any training.
+`transfer` records and identifies it, trains a policy on what was identified and lets it hop on the
+twin without tuning. `prediction` leaves trainings out: the simulations foretell how high shipped
+controllers hop on the twins. In `zero-shot` controllers hop on legs that they have never met. What
+is done stays in a folder: the same command goes on after an interruption, and more twins, methods
+or seeds add to what is there.
 
 Examples:
   python -m studies.sim_to_real transfer --json transfer.json
   python -m studies.sim_to_real prediction --json prediction.json
   python -m studies.sim_to_real transfer --twins 10 --seeds 0 1 2 --jobs 8
-  python -m studies.sim_to_real transfer --twins my_twin.toml other_twin.toml --jobs 2
   python -m studies.sim_to_real zero-shot --controllers universal energy-shaping --twins 100
 """
 

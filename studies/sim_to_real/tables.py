@@ -8,8 +8,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate import statistics
-
-Row = dict[str, Any]
+from studies.shared import Row
 
 _BOOTSTRAP_SEED = 0
 _ERROR = "median_abs_error_m"

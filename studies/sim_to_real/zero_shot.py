@@ -1,17 +1,15 @@
 """Controllers on legs that they have never met, without any tuning: pairs of leg and command."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
 from hopping_leg import io
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.cli.options import Heights, at_least, say
+from hopping_leg.cli.options import Heights, JsonFile, at_least, mm, say, show_table
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.controllers.command_schedule import command_range
 from hopping_leg.controllers.registry import ENERGY_SHAPING, MPC_TRUE_STATE, load_controller
@@ -22,11 +20,9 @@ from hopping_leg.deploy.stop_reasons import SupervisorInput
 from hopping_leg.deploy.supervisor import State, SupervisorState, supervise
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import entries, runner, statistics, trials
-from hopping_leg.evaluate.tables import millimetres
 from hopping_leg.hop_detection import find_hops, measure_hops
 from hopping_leg.robot import JOINTS, Robot, load_robot, parent_robot
-from hopping_leg.terminal import plain_console
-from studies.sim_to_real.jobs import StoredJob, work_through
+from studies.shared import Row, do_all
 from studies.sim_to_real.twins import disturbance_of, drawn_twin
 
 COMMANDS = (0.22, 0.24, 0.26, 0.28, 0.30, 0.32, 0.34, 0.36, 0.38, 0.40)
@@ -68,7 +64,7 @@ def stopped(run: Rollout, leg: int, robot: Robot) -> bool:
     return False
 
 
-def pair(run: Rollout, leg: int, command: float, robot: Robot) -> dict[str, Any]:
+def pair(run: Rollout, leg: int, command: float, robot: Robot) -> Row:
     """Return a leg's hops at one command, m, after the fifth.
 
     A skipped hop, and the whole run of a leg that never hops, err by how much lower it stands.
@@ -104,55 +100,24 @@ def _first_counted(height: Array, velocity: Array, clearance: Array) -> int:
     return int(ticks[_UNCOUNTED - 1]) + 1 if len(ticks) > _UNCOUNTED else len(height) // 3
 
 
-@dataclass(frozen=True)
-class ZeroShotTrial(StoredJob):
-    """A controller, told what is believed, on a leg of a robot file at each command."""
-
-    file: Path
-    source: str
-    controller: str
-    commands: tuple[float, ...]
-    seconds: float
-
-    @property
-    def name(self) -> str:
-        """What is done."""
-        return f"{self.controller} on {Path(self.source).stem}"
-
-    @property
-    def asked(self) -> dict[str, Any]:
-        """Controller, leg and trials."""
-        believed = believed_of(self.source)
-        return {
-            "controller": entries.fingerprint(self._load(believed)),
-            "robot": load_robot(self.source).digest,
-            "believed": believed.digest,
-            "commands": list(self.commands),
-            "seconds": self.seconds,
-        }
-
-    def run(self, *, quiet: bool) -> None:
-        """Hop at every command and write what was measured."""
-        robot, believed = load_robot(self.source), believed_of(self.source)
-        config = RolloutConfig(robot, disturbance_of(robot), threads=1)
-        controller, commands = self._load(believed), trials.scaled(self.commands, believed)
-        shown = np.clip(commands, *command_range(controller, believed))
-        schedule = np.tile(shown, (round(self.seconds * config.rate), 1))
-        run = rollout(controller, config, schedule, _SEED)
-        pairs = [pair(run, leg, command, robot) for leg, command in enumerate(commands)]
-        io.write_json(self.file, {"asked": self.asked, "pairs": pairs})
-
-    def _load(self, believed: Robot) -> Controller:
-        return load_controller(self.controller, believed, other="accept", simulated=True)
-
-    def pairs(self) -> list[dict[str, Any]]:
-        """Return what was measured."""
-        found = json.loads(self.file.read_text(encoding="utf-8"))["pairs"]
-        where = {"controller": self.controller, "robot": Path(self.source).stem}
-        return [{**where, **row} for row in found]
+def try_out(source: str, name: str, commands: Sequence[float], seconds: float) -> Row:
+    """Let a controller hop on the leg of a robot file at each command; return the pairs."""
+    robot, believed = load_robot(source), believed_of(source)
+    config = RolloutConfig(robot, disturbance_of(robot), threads=1)
+    controller, heights = _load(name, believed), trials.scaled(commands, believed)
+    shown = np.clip(heights, *command_range(controller, believed))
+    schedule = np.tile(shown, (round(seconds * config.rate), 1))
+    run = rollout(controller, config, schedule, _SEED)
+    where = {"controller": name, "robot": Path(source).stem}
+    pairs = [pair(run, leg, command, robot) for leg, command in enumerate(heights)]
+    return {"pairs": [{**where, **row} for row in pairs]}
 
 
-def summarize(pairs: Sequence[dict[str, Any]], controllers: Sequence[str]) -> list[dict[str, Any]]:
+def _load(name: str, believed: Robot) -> Controller:
+    return load_controller(name, believed, other="accept", simulated=True)
+
+
+def summarize(pairs: Sequence[Row], controllers: Sequence[str]) -> list[Row]:
     """Return a row per controller, over the pairs that are reached.
 
     Shares are of pairs; intervals are 95 % over legs.
@@ -185,7 +150,7 @@ def summarize(pairs: Sequence[dict[str, Any]], controllers: Sequence[str]) -> li
     return rows
 
 
-def _share(rows: Sequence[dict[str, Any]], name: str, holds: BoolArray) -> dict[str, float | None]:
+def _share(rows: Sequence[Row], name: str, holds: BoolArray) -> dict[str, float | None]:
     if not rows:
         return {name: None}
     legs: dict[str, list[bool]] = {}
@@ -200,7 +165,7 @@ def _share(rows: Sequence[dict[str, Any]], name: str, holds: BoolArray) -> dict[
     return {name: float(holds.mean()), f"{name}_low": float(low), f"{name}_high": float(high)}
 
 
-def _place(row: dict[str, Any]) -> tuple[str, float]:
+def _place(row: Row) -> tuple[str, float]:
     return row["robot"], row["command_m"]
 
 
@@ -224,24 +189,15 @@ class ZeroShot:
     """Trials at the same time, each in its own process."""
     out: Path = Path("runs/zero-shot")
     """Folder for twins and trials; what is there is not done again."""
-    json: Path | None = None
-    """Write every number to this file."""
+    json: JsonFile = None
 
-    def measure(self) -> dict[str, Any]:
+    def measure(self) -> Row:
         """Hop, print the summary, return every number."""
         at_least(1, jobs=self.jobs, twins=self.twins)
         names = list(dict.fromkeys((MPC_TRUE_STATE, *self.controllers)))
         sources = self._sources()
-        jobs = [
-            ZeroShotTrial(
-                self.out / "trials" / f"{Path(source).stem}-{io.safe_file_name(name)}.json",
-                source, name, self.commands, self.seconds,
-            )
-            for source in sources
-            for name in names
-        ]  # fmt: skip
-        work_through([jobs], self.jobs)
-        pairs = [row for job in jobs for row in job.pairs()]
+        tried = do_all((self._trial(s, name) for s in sources for name in names), self.jobs)
+        pairs = [row for found in tried for row in found["pairs"]]
         reached = {
             _place(row)
             for row in pairs
@@ -249,15 +205,38 @@ class ZeroShot:
         }
         for row in pairs:
             row["reached"] = _place(row) in reached
-        summary = summarize(pairs, names)
-        _show(summary, len(reached), len(sources) * len(self.commands))
+        summary, every = summarize(pairs, names), len(sources) * len(self.commands)
+        show_table(
+            ("controller", "within 5 mm, %", "within 10 mm, %", "closer than energy shaping, %",
+             "median, mm", "std, mm", "skipped", "body contacts", "would be stopped, %"),
+            (
+                (r["controller"], _percent(r["within_5mm"]), _percent(r["within_10mm"]),
+                 _percent(r["closer_than_energy_shaping"]), mm(r["median_abs_error_m"]),
+                 mm(r["median_std_m"]), r["skipped_hops"], r["body_contacts"],
+                 _percent(r["would_be_stopped"]))
+                for r in summary
+            ),
+        )  # fmt: skip
+        say(f"{len(reached)} of {every} pairs of leg and command are within reach of {names[0]}.")
         return {
             "legs": len(sources),
-            "reached": len(reached) / (len(sources) * len(self.commands)),
+            "reached": len(reached) / every,
             "summary": summary,
             "pairs": pairs,
             "versions": runner.software_versions(),
         }
+
+    def _trial(self, source: str, name: str) -> tuple[Any, ...]:
+        believed = believed_of(source)
+        asked = {
+            "controller": entries.fingerprint(_load(name, believed)),
+            "robot": load_robot(source).digest,
+            "believed": believed.digest,
+            "commands": self.commands,
+            "seconds": self.seconds,
+        }
+        file = self.out / "trials" / f"{Path(source).stem}-{io.safe_file_name(name)}.json"
+        return file, asked, try_out, source, name, self.commands, self.seconds
 
     def _sources(self) -> list[str]:
         if self.folder is None:
@@ -272,21 +251,5 @@ class ZeroShot:
         return files
 
 
-def _show(summary: Sequence[dict[str, Any]], reached: int, every: int) -> None:
-    table = Table(
-        "controller", "within 5 mm, %", "within 10 mm, %", "closer than energy shaping, %",
-        "median, mm", "std, mm", "skipped", "body contacts", "would be stopped, %",
-    )  # fmt: skip
-    for row in summary:
-        shares = (row["within_5mm"], row["within_10mm"], row["closer_than_energy_shaping"])
-        table.add_row(
-            row["controller"],
-            *("–" if share is None else f"{100 * share:.1f}" for share in shares),
-            millimetres(row["median_abs_error_m"]),
-            millimetres(row["median_std_m"]),
-            str(row["skipped_hops"]),
-            str(row["body_contacts"]),
-            f"{100 * row['would_be_stopped']:.1f}",
-        )
-    plain_console().print(table)
-    say(f"{reached} of {every} pairs of leg and command are within reach of {MPC_TRUE_STATE}.")
+def _percent(share: float | None) -> str:
+    return "–" if share is None else f"{100 * share:.1f}"

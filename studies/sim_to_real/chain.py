@@ -1,0 +1,249 @@
+"""The chain of a study, stage by stage, for many twins and methods; results stay in a folder."""
+
+import hashlib
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.cli.options import Heights, JsonFile, at_least
+from hopping_leg.controllers.energy_shaping.gains import load_gains
+from hopping_leg.controllers.registry import ENERGY_SHAPING
+from hopping_leg.evaluate import entries, runner
+from hopping_leg.evaluate.statistics import LEAST_TWINS
+from hopping_leg.rl.recipes import get_recipe, randomise
+from hopping_leg.robot import Robot, load_robot
+from studies.shared import Row, do_all
+from studies.sim_to_real import steps
+from studies.sim_to_real.methods import Method, choose_methods
+from studies.sim_to_real.twins import Twin, disturbance_of, find_twins, simulated
+
+HOPPERS = ("fast", ENERGY_SHAPING)
+"""What hops are foretold of: a policy, which no hop corrects, so that its apexes tell most of the
+leg, and energy shaping, which no simulation has trained."""
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What is compared on which twins, and where it is kept."""
+
+    twins: tuple[str, ...] = (str(LEAST_TWINS),)
+    """How many twins to draw, or robot files that extend what is believed of them; intervals over
+    twins need 20."""
+    methods: tuple[str, ...] | None = None
+    """What policies are trained on, the others being compared with the first; or what foretells.
+    Valid: identified, cad, table-1, rail-only, fixed-base-only, two-pass, one-pass, truth; not to
+    foretell, as each leg in training differs, identified-posterior, randomised; and, not trained,
+    energy-shaping, energy-shaping-tuned, universal, universal-identified.
+    Default: identified, cad, table-1, randomised and energy-shaping; or all that can foretell."""
+    seeds: tuple[int, ...] = (0,)
+    """Seeds of the trainings, one of each method and twin each."""
+    recipe: str = "fast"
+    """Recipe by which policies are trained, as in `hop train`."""
+    steps: int = 1_200_000
+    """Control steps of experience of a training."""
+    seconds: float = 60.0
+    """Duration of each recording, s; the paper's are 240 s, a swing per amplitude takes 30 s."""
+    generations: int = 100
+    """Generations of CMA-ES in each pass, for the methods two-pass and one-pass."""
+    commands: Heights = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)
+    """Apex heights at which the twins are tried, m."""
+    repeats: int = 3
+    """Runs of 15 s at each command."""
+    jobs: int = 1
+    """Recordings, fits, trainings or trials at the same time, each in its own process."""
+    folder: Path = Path("runs/transfer")
+    """Folder for recordings, robots, trainings and trials; what is there is not done again."""
+    json: JsonFile = None
+
+
+class Chain:
+    """Twins and methods of an experiment; each stage does what is not done yet.
+
+    Raises:
+        UsageError: An option has no meaning.
+        RobotError: There is no such twin.
+    """
+
+    def __init__(self, asked: Experiment, methods: Iterable[str]) -> None:
+        at_least(1, jobs=asked.jobs, steps=asked.steps, generations=asked.generations)
+        at_least(1, repeats=asked.repeats, seeds=len(asked.seeds))
+        at_least(30, seconds=round(asked.seconds))
+        get_recipe(asked.recipe)
+        self.asked, self.methods = asked, choose_methods(tuple(methods))
+        self.twins = find_twins(asked.twins, asked.folder / "twins")
+
+    def about(self) -> Row:
+        """Return what results begin with: the twins and how they were met."""
+        return {
+            "twins": [
+                {
+                    "name": twin.name,
+                    "robot_digest": twin.robot.digest,
+                    "believed": twin.believed,
+                    "paper_disturbance": disturbance_of(twin.robot).delay_probability > 0,
+                }
+                for twin in self.twins
+            ],
+            "recording_seconds": self.asked.seconds,
+            "evaluation_seed": steps.FIRST_SEED,
+            "evaluation_seeds": self.asked.repeats,
+            "versions": runner.software_versions(),
+        }
+
+    def source(self, twin: Twin, method: Method) -> str:
+        """Return the robot that a method simulates for a twin: its name or file."""
+        if method.truth:
+            return twin.source
+        if method.fit:
+            return str(self._file("robots", f"{twin.name}-{method.fit.name}.toml"))
+        return method.robot or twin.believed
+
+    def identify(self) -> list[Row]:
+        """Record the twins and identify them; return the fits, several methods may share one."""
+        seconds = self.asked.seconds
+        rigs = sorted({rig for method in self.methods if method.fit for rig in method.fit.rigs})
+        files = {
+            (twin, rig): self._file("recordings", f"{twin.name}-{rig}.parquet")
+            for twin in self.twins
+            for rig in rigs
+        }
+        recorded = do_all(
+            (
+                (_beside(file), {"twin": twin.robot.digest, "seconds": seconds},
+                 steps.record, twin, rig, seconds, file)
+                for (twin, rig), file in files.items()
+            ),
+            self.asked.jobs,
+        )  # fmt: skip
+        digests = {key: row["digest"] for key, row in zip(files, recorded, strict=True)}
+        jobs, names = [], []
+        for fit, twin, method in {
+            (m.fit, twin): (m.fit, twin, m) for m in self.methods for twin in self.twins if m.fit
+        }.values():
+            generations = None if fit.search == "least-squares" else self.asked.generations
+            asked = {
+                "believed": load_robot(twin.believed).digest,
+                "recordings": [digests[twin, rig] for rig in fit.rigs],
+                "search": fit.search,
+                "generations": generations,
+            }
+            file = Path(self.source(twin, method))
+            recordings = [files[twin, rig] for rig in fit.rigs]
+            jobs.append((_beside(file), asked, steps.fit, twin, recordings, fit.search,
+                         generations or 1, file))  # fmt: skip
+            names.append(fit.name)
+        fits = do_all(jobs, self.asked.jobs)
+        return [{"method": name, **row} for name, row in zip(names, fits, strict=True)]
+
+    def train(self) -> list[Row]:
+        """Train all policies and tune all gains; return the trainings."""
+        tuned = [(twin, method) for method in self.methods if method.tuned for twin in self.twins]
+        do_all((self._tuning(*pair) for pair in tuned), self.asked.jobs)
+        every = [self._training(*job) for job in self._runs() if not job[1].untrained]
+        return do_all({job[0]: job for job in every}.values(), self.asked.jobs)
+
+    def _runs(self) -> list[tuple[Twin, Method, int]]:
+        """Return every trial; what is not trained has one for each twin."""
+        first = self.asked.seeds[0]
+        every = ((t, m, s) for s in self.asked.seeds for m in self.methods for t in self.twins)
+        return [(t, m, s) for t, m, s in every if s == first or not m.untrained]
+
+    def _training(self, twin: Twin, method: Method, seed: int) -> tuple[Any, ...]:
+        """Return the job of a training; what does not depend on the twin is trained once."""
+        source = self.source(twin, method)
+        recipe = get_recipe(self.asked.recipe).replace({"steps": self.asked.steps})
+        if method.ranges == "intervals":
+            fitted = json.loads(_beside(Path(source)).read_bytes())["result"]["parameters"]
+            recipe = recipe.replace({"task.randomised": steps.interval_ranges(fitted)})
+        else:
+            recipe = randomise(recipe, method.ranges)
+        asked = {"recipe": repr(recipe), "robot": simulated(source).digest, "seed": seed}
+        name = f"{twin.name}-{method.name}"
+        if not method.fit and not method.truth:
+            name = Path(source).stem + ("" if method.ranges == "none" else f"-{method.ranges}")
+        mark = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:8]
+        folder = self._file("training", f"{name}-seed{seed}-{mark}")
+        return (folder.with_name(f"{folder.name}.json"), asked, steps.learn, recipe, source, seed,
+                folder)  # fmt: skip
+
+    def _tuning(self, twin: Twin, method: Method) -> tuple[Any, ...]:
+        source = self.source(twin, method)
+        asked = {
+            "robot": load_robot(source).digest,
+            "start": asdict(load_gains(ENERGY_SHAPING).gains),
+            "search": repr(steps.TUNE),
+        }
+        folder = self._file("gains", f"{twin.name}-{method.name}")
+        return folder.with_suffix(".json"), asked, steps.tune, source, folder
+
+    def hop(self) -> list[Row]:
+        """Let all policies hop on the twins; return a record per policy, twin and command."""
+        runs = self._runs()
+        jobs = []
+        for twin, method, seed in runs:
+            controller: str | Path = method.untrained
+            if method.tuned:
+                controller = self._tuning(twin, method)[-1] / "gains.toml"
+            elif not method.untrained:
+                controller = self._training(twin, method, seed)[-1] / "policy.onnx"
+            told = self.source(twin, method) if method.untrained else twin.believed
+            name = f"trials/{twin.name}-{method.name}-seed{seed}.json"
+            jobs.append(self._trial(name, controller, told, twin.robot))
+        return [
+            {"method": method.name, "twin": twin.name, "seed": seed, **row}
+            for (twin, method, seed), tried in zip(runs, do_all(jobs, self.asked.jobs), strict=True)
+            for row in tried["rows"]
+        ]
+
+    def foretell(self) -> list[Row]:
+        """Let the shipped controllers hop on the twins and in the methods' simulations of them.
+
+        Returns:
+            A record per controller, method and twin: ``errors_m`` are predicted minus measured
+            median apexes by command.
+        """
+        places = [
+            (twin, hopper, method, simulated(self.source(twin, method)) if method else twin.robot)
+            for hopper in HOPPERS
+            for twin in self.twins
+            for method in (None, *self.methods)
+        ]
+        jobs = []
+        for twin, hopper, method, leg in places:
+            end = f"-{method.name}" if method else ""
+            name = f"predictions/{twin.name}-{hopper}{end}.json"
+            jobs.append(self._trial(name, hopper, twin.believed, leg))
+        found, true = [], np.empty(0)
+        for (twin, hopper, method, _), tried in zip(
+            places, do_all(jobs, self.asked.jobs), strict=True
+        ):
+            apexes = np.array([row["command_m"] + row["median_error_m"] for row in tried["rows"]])
+            if method is None:
+                true = apexes
+                continue
+            errors = (apexes - true).tolist()
+            found.append(
+                {"controller": hopper, "method": method.name, "twin": twin.name, "errors_m": errors}
+            )
+        return found
+
+    def _trial(self, name: str, controller: str | Path, told: str, leg: Robot) -> tuple[Any, ...]:
+        asked = {
+            "policy": entries.fingerprint(steps.load(controller, told)),
+            "twin": leg.digest,
+            "commands": self.asked.commands,
+            "repeats": self.asked.repeats,
+        }
+        return (self.asked.folder / name, asked, steps.try_out, controller, told, leg,
+                self.asked.commands, self.asked.repeats)  # fmt: skip
+
+    def _file(self, kind: str, name: str) -> Path:
+        return self.asked.folder / kind / name
+
+
+def _beside(file: Path) -> Path:
+    return file.with_suffix(".json")

@@ -1,0 +1,125 @@
+"""What policies are trained on before they meet a twin, and what they hop beside."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from hopping_leg.controllers.registry import ENERGY_SHAPING
+from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.identify.recording_format import Rig
+from hopping_leg.rl.recipes import Randomise
+
+RIGS: tuple[Rig, ...] = ("fixed-base", "rail")
+
+Search = Literal["least-squares", "two-pass", "one-pass"]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How the simulation is fitted to recordings of the twin.
+
+    Attributes:
+        name: Of its files; methods may share a fit.
+        rigs: Whose recordings are used.
+        search: ``least-squares`` on positions and torques, the paper's ``two-pass`` CMA-ES on
+            positions, or ``one-pass``, the same over all parameters at once.
+    """
+
+    name: str = "identified"
+    rigs: tuple[Rig, ...] = RIGS
+    search: Search = "least-squares"
+
+
+@dataclass(frozen=True)
+class Method:
+    """Where a policy is trained.
+
+    Attributes:
+        name: On the command line and in the results.
+        meaning: A phrase for tables.
+        fit: How the twin is identified; None if it is not.
+        robot: Robot that is trained on without a fit; None takes the one that the twin extends.
+        ranges: What every leg in training draws for itself, around the robot; ``intervals`` of
+            the fit, or those of ``hop train``.
+        truth: Whether the twin's own file is the robot, [reality] left out but for the delay:
+            what a perfect fit would find.
+        untrained: Controller that hops as it is; empty where there is a training. It is told the
+            robot that the fit gives, or else the one that the twin extends.
+        tuned: Whether the gains of an untrained energy shaping are searched anew on that robot.
+    """
+
+    name: str
+    meaning: str
+    fit: Fit | None = None
+    robot: str | None = None
+    ranges: Randomise | Literal["intervals"] = "none"
+    truth: bool = False
+    untrained: str = ""
+    tuned: bool = False
+
+    @property
+    def simulates(self) -> bool:
+        """Whether it believes in one leg, whose hops can be foretold."""
+        return self.ranges == "none" and not self.untrained
+
+
+METHODS = {
+    method.name: method
+    for method in (
+        Method("identified", "identified from both recordings", Fit()),
+        Method(
+            "identified-posterior",
+            "identified, every leg drawn from the intervals of the fit",
+            Fit(),
+            ranges="intervals",
+        ),
+        Method("cad", "CAD defaults"),
+        Method("table-1", "the paper's Table I", robot="legv2-paper"),
+        Method("randomised", "domain randomisation over the twins' ranges", ranges="twins"),
+        Method("rail-only", "identified from the rail alone", Fit("rail-only", rigs=("rail",))),
+        Method(
+            "fixed-base-only",
+            "identified with the base clamped",
+            Fit("fixed-base-only", rigs=("fixed-base",)),
+        ),
+        Method("two-pass", "the paper's two passes of CMA-ES", Fit("two-pass", search="two-pass")),
+        Method("one-pass", "the same CMA-ES in one pass", Fit("one-pass", search="one-pass")),
+        Method("truth", "true parameters: what a perfect fit would find", truth=True),
+        Method(ENERGY_SHAPING, "energy shaping, shipped gains", untrained=ENERGY_SHAPING),
+        Method(
+            "energy-shaping-tuned",
+            "energy shaping, tuned on what both recordings identify",
+            Fit(),
+            untrained=ENERGY_SHAPING,
+            tuned=True,
+        ),
+        Method("universal", "`universal`, told the CAD's robot", untrained="universal"),
+        Method(
+            "universal-identified",
+            "`universal`, told what both recordings identify",
+            Fit(),
+            untrained="universal",
+        ),
+    )
+}
+"""Every method by name."""
+
+DEFAULT = ("identified", "cad", "table-1", "randomised", ENERGY_SHAPING)
+"""What policies are trained on, and what they hop beside, unless asked otherwise."""
+
+FORETOLD = tuple(name for name, method in METHODS.items() if method.simulates)
+"""Whose predictions are compared unless asked otherwise, ablations of identification among them."""
+
+
+def choose_methods(names: Sequence[str]) -> tuple[Method, ...]:
+    """Return methods by name, each once.
+
+    Raises:
+        UsageError: There is no such method, or none is named.
+    """
+    for name in names:
+        if name not in METHODS:
+            raise UsageError(unknown_name("method", name, METHODS))
+    if not names:
+        raise UsageError(f"No method is left; name some of: {', '.join(METHODS)}.")
+    return tuple(METHODS[name] for name in dict.fromkeys(names))

@@ -1,0 +1,220 @@
+"""The steps of the chain for one twin: record, identify, train, tune, hop; each gives a record."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from hopping_leg.arrays import Array
+from hopping_leg.controllers import Controller, RolloutConfig
+from hopping_leg.controllers.command_schedule import command_range
+from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller
+from hopping_leg.evaluate import entries, runner
+from hopping_leg.evaluate.motor_load import MotorLoad
+from hopping_leg.identify import cost, excitation, optimizers, plan, play_excitation
+from hopping_leg.identify.paper_excitation import Strokes, adapt, fixed_base, moving_base
+from hopping_leg.identify.parameters import LegHypothesis
+from hopping_leg.identify.pipeline import IdentifyOptions, identify
+from hopping_leg.identify.recording import Recording, load_recording
+from hopping_leg.identify.recording_format import Rig
+from hopping_leg.identify.result import as_json, save_robot
+from hopping_leg.rl.recipe import Recipe
+from hopping_leg.rl.run_folder import read_result
+from hopping_leg.rl.train import train
+from hopping_leg.robot import Robot, load_robot
+from hopping_leg.sim import Measurement
+from hopping_leg.sim.randomization import RANDOMIZABLE, Range
+from studies.energy_shaping.tune import Tune
+from studies.shared import Row
+from studies.sim_to_real.methods import RIGS, Search
+from studies.sim_to_real.twins import Twin, disturbance_of, simulated
+
+FIRST_SEED = 1000
+"""First seed of the trials; no seed from here on has chosen anything."""
+
+_BOTH_SWINGS = 120.0
+"""Recordings of so many seconds have room for both swing periods of the paper."""
+
+_USUAL_FIT = optimizers.LeastSquaresOptions(tolerance=1e-3)
+"""A round that lowers the cost by a smaller share ends the search."""
+
+_INERTIA_FACTOR = 10.0
+"""How far off the CAD's link inertias may be: the paper's Table I has nine times the shank's."""
+
+
+def record(twin: Twin, rig: Rig, seconds: float, file: Path) -> Row:
+    """Let a twin track the paper's trajectory on a rig and write the recording."""
+    believed = load_robot(twin.believed)
+    recording = play_excitation.play(
+        excitation.make_excitation(adapt(_strokes(rig, seconds), believed), believed),
+        twin.robot,
+        believed=twin.believed,
+        seed=RIGS.index(rig),
+    )
+    recording.save(file)
+    return {"digest": recording.digest}
+
+
+def _strokes(rig: Rig, seconds: float) -> Strokes:
+    if rig != "fixed-base":
+        return moving_base(duration=seconds)
+    swings = (10.0, 20.0) if seconds >= _BOTH_SWINGS else (10.0,)
+    return fixed_base(swings=swings, duration=seconds)
+
+
+def fit(
+    twin: Twin, recordings: Sequence[Path], search: Search, generations: int, file: Path
+) -> Row:
+    """Identify a twin and write the robot file.
+
+    Returns:
+        Errors on data that the fit has not seen, before and after, and the parameters.
+    """
+    believed, loaded = load_robot(twin.believed), [load_recording(path) for path in recordings]
+    options = _fit_options(loaded, believed, search, generations)
+    identified = identify(loaded, believed, options=options)
+    save_robot(identified, file, twin.believed)
+    found = as_json(identified)
+    before, after, truth = found["start_validation"], found["validation"], _truth(twin)
+    errors = ("closed_loop_position_rms_rad", "closed_loop_torque_rms_nm")
+    kept = ("name", "unit", "start", "value", "interval_low", "interval_high", "at_bound",
+            "bound_low", "bound_high")  # fmt: skip
+    return {
+        "twin": twin.name,
+        **{f"{name}_before": before[name] for name in errors},
+        **{name: after[name] for name in errors},
+        "parameters": [
+            {**{key: row[key] for key in kept}, "truth": truth(row["name"])}
+            for row in found["parameters"]
+        ],
+    }
+
+
+def _fit_options(
+    recordings: list[Recording], believed: Robot, search: Search, generations: int
+) -> IdentifyOptions:
+    links = {"thigh.inertia": believed.thigh.inertia, "shank.inertia": believed.shank.inertia}
+    options = IdentifyOptions(
+        bounds={k: (v / _INERTIA_FACTOR, v * _INERTIA_FACTOR) for k, v in links.items()},
+        search=search,
+        effort=optimizers.SearchOptions(
+            least_squares=_USUAL_FIT, cma=optimizers.CmaOptions(generations=generations)
+        ),
+    )
+    if search != "one-pass":
+        return options
+    names = plan.make_plan(recordings, believed, search="two-pass").parameters.names
+    return replace(options, search="cma", parameters=tuple(names), scoring=cost.Scoring())
+
+
+def _truth(twin: Twin) -> Callable[[str], float | None]:
+    """Return what gives the twin's own value of a fitted number, None where it has none."""
+    robot = simulated(twin.source)
+    leg = LegHypothesis(robot)
+
+    def value(name: str) -> float | None:
+        if name.startswith("drive."):
+            return robot.reality.latency.command if name == "drive.delay" else None
+        return leg.get(name)
+
+    return value
+
+
+def interval_ranges(parameters: Sequence[Row]) -> tuple[Range, ...]:
+    """Return the intervals of a fit as ranges, of the numbers that may differ from leg to leg.
+
+    What the data say nothing about spans what the fit searched. Correlations are left out.
+    """
+    found = []
+    for row in parameters:
+        low, high = row["interval_low"], row["interval_high"]
+        if low is None or high is None:  # not finite
+            low, high = row["bound_low"], row["bound_high"]
+        if row["name"] in RANDOMIZABLE:
+            found.append(Range(row["name"], row["unit"], low, high, "95 % interval of the fit"))
+    return tuple(found)
+
+
+def learn(recipe: Recipe, source: str, seed: int, folder: Path) -> Row:
+    """Train a policy in the simulation of a robot; a training that was killed goes on.
+
+    Returns:
+        How it hops in the simulation that it was trained in.
+    """
+    if not (folder / "policy.onnx").exists():
+        train(recipe, simulated(source), seed, folder, resume=True, threads=1, quiet=True)
+    result = read_result(folder)
+    errors = [trial["median_error_m"] for trial in result["selected"]["trials"]]
+    return {
+        "training": folder.name,
+        "minutes": result["minutes"],
+        "steps": result["steps"],
+        "own_simulation_worst_abs_median_error_m": (
+            None if None in errors else max(map(abs, errors))
+        ),
+        "own_simulation_score_m": float(result["selected"]["score_m"]),
+    }
+
+
+TUNE = Tune(start=ENERGY_SHAPING, threads=1)
+
+
+def tune(source: str, folder: Path) -> Row:
+    """Search gains of energy shaping in the simulation of a robot."""
+    return replace(TUNE, robot=source, out=folder).find()
+
+
+class WithinRange:
+    """A controller that is asked for the nearest command that it knows; a Controller."""
+
+    def __init__(self, controller: Controller, robot: Robot) -> None:
+        self.name, self._controller = controller.name, controller
+        self._range = command_range(controller, robot)
+
+    def reset(self, count: int) -> None:
+        """Forget everything."""
+        self._controller.reset(count)
+
+    def act(self, measurement: Measurement) -> Array:
+        """Return joint torques, N m, (n, 2)."""
+        command = measurement.command.clip(*self._range)
+        return self._controller.act(replace(measurement, command=command))
+
+    def internals(self) -> dict[str, Array]:
+        """Return what the controller shows."""
+        return self._controller.internals()
+
+
+_KEPT = ("command_m", "median_error_m", "median_abs_error_m", "std_m", "hops", "skipped_hops",
+         "missed_runs", "hop_rate_hz", "flight_fraction", "body_contacts",
+         *MotorLoad.__dataclass_fields__)  # fmt: skip
+
+
+def load(controller: str | Path, told: str) -> Controller:
+    """Return a controller that is told a robot, by name or file."""
+    return load_controller(controller, load_robot(told), other="accept")
+
+
+def hop(controller: Controller, leg: Robot, commands: Sequence[float], repeats: int) -> list[Row]:
+    """Let a controller hop on a leg, ``repeats`` runs of 15 s at each command, a record each.
+
+    Errors are apex minus command. A leg that never leaves the ground at a command counts as
+    ``motionless``; its error is standing height minus command. A policy whose training reached less
+    high is asked for the highest command that it knows.
+    """
+    judged = runner.evaluate(
+        [entries.entry_of("policy", WithinRange(controller, leg))],
+        RolloutConfig(leg, disturbance_of(leg), threads=1),
+        commands=tuple(commands),
+        repeats=repeats,
+        seed=FIRST_SEED,
+        kinds=("fixed",),
+    )
+    summary = judged.evaluation.to_json()["summary"]
+    return [{**{n: row[n] for n in _KEPT}, "motionless": not row["hops"]} for row in summary]
+
+
+def try_out(
+    controller: str | Path, told: str, leg: Robot, commands: Sequence[float], repeats: int
+) -> Row:
+    """Return ``hop``'s records of a controller that is told a robot."""
+    return {"rows": hop(load(controller, told), leg, commands, repeats)}
