@@ -67,10 +67,6 @@ REFUSED = {"hop doctor --transport /dev/fdcanusb --robot my_leg.toml --home 0.0 
 
 BEFORE = {
     "own-controller": "class TheirController:\n    def __init__(self, mass, dt): pass",
-    "emulator": "from hopping_leg.emulator.faults import Fault\n"
-    "from hopping_leg.emulator.process import EmulatorProcess\n"
-    "from hopping_leg.emulator.server import EmulatorConfig\n"
-    "def drive(path): assert path.exists()",
 }
 """Python that a page takes for granted."""
 

@@ -8,10 +8,10 @@ ROOT = Path(__file__).parents[1]
 
 CEILINGS = {
     "src/hopping_leg/*.py": (14, 1440),
-    "src/hopping_leg/cli/**/*.py": (17, 2530),
+    "src/hopping_leg/cli/**/*.py": (17, 2520),
     "src/hopping_leg/controllers/**/*.py": (21, 3140),
     "src/hopping_leg/deploy/**/*.py": (19, 3140),
-    "src/hopping_leg/emulator/**/*.py": (17, 2560),
+    "src/hopping_leg/emulator/**/*.py": (15, 2170),
     "src/hopping_leg/envs/**/*.py": (10, 1780),
     "src/hopping_leg/evaluate/**/*.py": (18, 3140),
     "src/hopping_leg/formats/**/*.py": (4, 330),
@@ -20,10 +20,10 @@ CEILINGS = {
     "src/hopping_leg/robot/**/*.py": (17, 2790),
     "src/hopping_leg/sim/**/*.py": (13, 2520),
     "src/hopping_leg/viewer/**/*.py": (9, 1510),
-    "src/**/*.py": (209, 33220),
-    "tests/**/*.py": (151, 17610),
-    "studies/**/*.py": (87, 9450),
-    "docs/**/*.md": (38, 3340),
+    "src/**/*.py": (207, 32820),
+    "tests/**/*.py": (151, 17570),
+    "studies/**/*.py": (89, 9710),
+    "docs/**/*.md": (38, 3320),
     "docs/live/*.js": (13, 1490),
 }
 """Files and lines at most. Who raises one says what users gain by it."""

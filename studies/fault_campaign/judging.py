@@ -10,11 +10,11 @@ from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.deploy.hardware_trials import Performance
 from hopping_leg.deploy.supervisor import State
-from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.errors import TraceError
 from studies.fault_campaign.case import Result, Scene
 from studies.fault_campaign.families import Family
 from studies.fault_campaign.verdict import problems_of_commands, reaction, restarts
+from studies.fault_campaign.wire_log import WireLog
 
 BRAKED_WITHIN = 0.025
 """Time from the host's death within which the drives must brake, s."""

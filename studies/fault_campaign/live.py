@@ -15,12 +15,11 @@ from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.transport import open_transport
-from hopping_leg.emulator.process import EmulatorProcess
-from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.errors import TraceError
 from hopping_leg.robot.parameters import JOINTS, Robot
 from hopping_leg.trace import Trace
 from studies.fault_campaign.case import Case, Result, Scene, words
+from studies.fault_campaign.emulator_process import EmulatorProcess
 from studies.fault_campaign.families import Family
 from studies.fault_campaign.judging import (
     BRAKED_WITHIN,
@@ -28,6 +27,7 @@ from studies.fault_campaign.judging import (
     judge_wire,
     problems_of_box,
 )
+from studies.fault_campaign.wire_log import WireLog
 
 LIVE = (
     *("encoder jump", "drive fault", "over-temperature", "over-voltage", "under-voltage"),

@@ -22,6 +22,7 @@ from studies.fault_campaign.judging import (
     judge_wire,
     problems_of_box,
 )
+from studies.fault_campaign.wire_log import WireLog
 
 _WATCHED = 0.1
 """How long the drives are watched after the host's death, s."""
@@ -123,10 +124,17 @@ def play(case: Case, family: Family, robot: Robot) -> Result:
     return result
 
 
+def _logged(scene: Scene) -> tuple[Lockstep, WireLog]:
+    """Return the robot of a trial and the log of its wire."""
+    lockstep, log = Lockstep(scene.start.build(), checksums=scene.checksums), WireLog()
+    lockstep.robot.observer = log
+    return lockstep, log
+
+
 def _refused(scene: Scene) -> Result:
     """Ask for arming; it must be refused in a sentence, and nothing may move."""
     result = Result(words(scene.mishap), began=0.0)
-    lockstep = Lockstep(scene.start.build(), checksums=scene.checksums)
+    lockstep, log = _logged(scene)
     try:
         scene.require_fitness(lockstep.link)
         result.problems.append("the drives would have been armed")
@@ -134,7 +142,7 @@ def _refused(scene: Scene) -> Result:
         result.reason, result.sentence = "NOT_ARMED", str(error)
     finally:
         lockstep.link.close()
-    if any(told.mode is not DriveMode.STOPPED for told in lockstep.robot.log.commands):
+    if any(told.mode is not DriveMode.STOPPED for told in log.commands):
         result.problems.append("a drive was powered")
     return result
 
@@ -143,7 +151,7 @@ def _hop(scene: Scene) -> Result:
     """Hop until the mishap and beyond."""
     mishap = scene.mishap
     result = Result(words(mishap))
-    lockstep = Lockstep(scene.start.build(), checksums=scene.checksums)
+    lockstep, log = _logged(scene)
     clock = StruckClock(lockstep, mishap.at, stall=mishap.stall, dies=mishap.dies)
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -160,7 +168,7 @@ def _hop(scene: Scene) -> Result:
         result.problems.append("the mishap did not happen")
         return result
     modes = [drive.machine.mode for drive in lockstep.robot.drives]
-    judge_wire(result, scene, lockstep.robot.log, modes)
+    judge_wire(result, scene, log, modes)
     if done is not None:
         judge_trace(result, done, scene.family)
         return result

@@ -7,8 +7,8 @@ from itertools import takewhile
 
 from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.deploy.safety_limits import SafetyLimits
-from hopping_leg.emulator.wire_log import CommandEvent, ReplyEvent, WireLog
 from hopping_leg.robot.parameters import Robot
+from studies.fault_campaign.wire_log import CommandEvent, ReplyEvent, WireLog
 
 SAFE = (DriveMode.STOPPED, DriveMode.BRAKE)
 """Commands that cannot move the leg."""

@@ -23,7 +23,6 @@ from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTim
 from hopping_leg.deploy.realtime import Clock, RealClock, keeping_time
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.transport import open_transport
-from hopping_leg.emulator.process import EmulatorProcess
 from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import UsageError
@@ -32,6 +31,7 @@ from hopping_leg.hop_detection import BOUNCE, FLIGHT_CLEARANCE, trace_hops
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, SoftLimiter
 from hopping_leg.trace import Trace
+from studies.fault_campaign.emulator_process import EmulatorProcess
 from studies.shared import Row, host, show_numbers
 
 HEIGHTS = (0.25, 0.30, 0.35)

@@ -10,12 +10,12 @@ import time
 
 import numpy as np
 import pytest
+from studies.fault_campaign.emulator_process import EmulatorProcess
 
 from hopping_leg.cli import main
 from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.deploy.flight_recorder import recover
 from hopping_leg.deploy.supervisor import State
-from hopping_leg.emulator.process import EmulatorProcess
 from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.errors import TraceError
 from hopping_leg.trace import Trace
@@ -142,9 +142,8 @@ time.sleep(600)
 """
 
 
-@pytest.mark.parametrize("interface", ["pty", "udp_multicast"])
-def test_a_second_host_is_refused_with_the_name_of_the_first(emulator, interface):
-    path = emulator.path if interface == "pty" else "udp_multicast:239.74.163.99"
+def test_a_second_host_is_refused_with_the_name_of_the_first(emulator):
+    path = emulator.path
     words = ["doctor", "--transport", str(path), "--robot", "legv2-paper"]
     code = [sys.executable, "-c", HOST, str(path)]
     with subprocess.Popen(code, stdout=subprocess.PIPE, text=True) as first:

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from moteus.fdcanusb_device import _append_checksum, _compute_crc8
+from studies.fault_campaign.wire_log import WireLog
 
 from hopping_leg.deploy.frames import Frame, crc8, padded
 from hopping_leg.emulator.bus import ReplyWriter
@@ -80,11 +81,12 @@ def test_no_payload_breaks_a_drive(bench, data):
 @pytest.mark.parametrize(("resolution", "told"), [(moteus.INT16, 65.0), (moteus.F32, 65.04)])
 def test_an_answer_is_logged_as_it_travels_if_it_tells_the_state(resolution, told):
     bench = Bench()
+    bench.robot.observer = log = WireLog()
     bench.robot.drives[0].disturbances.temperature = 35.04
     bench.read(R.POSITION, R.TEMPERATURE)
-    assert not list(bench.robot.log.answers())
+    assert not list(log.answers())
     bench.read(R.MODE, R.FAULT, R.VOLTAGE, R.TEMPERATURE, resolution=resolution)
-    (answer,) = bench.robot.log.answers()
+    (answer,) = log.answers()
     assert answer.temperature == pytest.approx(told, abs=1e-5)
 
 

@@ -1,14 +1,13 @@
 """Emulate a leg with its two drives behind a real wire, for `hop deploy` and `hop doctor`.
 
-The emulator offers a serial terminal which the moteus client takes for an fdcanusb, or a CAN bus of
-python-can. Behind it two drives, with their own mode machines, watchdogs and limits, turn the
-simulated leg in real time. Ends with Ctrl-C.
+The emulator offers a serial terminal which the moteus client takes for an fdcanusb. Behind it two
+drives, with their own mode machines, watchdogs and limits, turn the simulated leg in real time.
+Ends with Ctrl-C.
 
 Examples:
   hop emulate --robot legv2
   hop deploy fast --transport /dev/pts/5        # in another terminal, with the path printed here
   hop emulate --robot twin --faults faults.toml --link /tmp/leg
-  hop emulate --interface udp_multicast
   hop emulate --no-homed --no-configured        # as a leg that was just put together
 
 A fault script is TOML; `hop emulate --kinds` lists what it may name:
@@ -28,7 +27,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from hopping_leg.cli.options import at_least, say, say_next, show_table
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode
@@ -55,10 +54,6 @@ class Emulate:
     """stand, crouch, stretch, zero (straight down), or angles of hip and knee, rad."""
     faults: Path | None = None
     """TOML script of faults and their times."""
-    interface: Literal["pty", "udp_multicast", "socketcan"] = "pty"
-    """pty is a serial terminal like an fdcanusb's; the others are buses of python-can."""
-    channel: str | None = None
-    """Channel of a CAN bus: multicast group or interface name; default 239.74.163.2 or vcan0."""
     link: Path | None = None
     """Also offer the terminal under this path, which stays the same when it is plugged again."""
     configured: bool = True
@@ -93,8 +88,6 @@ def run(args: Emulate) -> None:
         held=args.held,
         seed=args.seed,
         faults=() if args.faults is None else load_faults(args.faults),
-        interface=args.interface,
-        channel=args.channel,
         link=args.link,
     )
     robot, port = start.build(), start.open()
@@ -102,8 +95,7 @@ def run(args: Emulate) -> None:
     try:
         with _ending_signals() as over:
             ids = " and ".join(str(drive.id) for drive in robot.drives)
-            where = f"on {port}." if ":" in str(port) else f"behind {port}"
-            say(f"Drives {ids} of {robot.robot.name} {where}")
+            say(f"Drives {ids} of {robot.robot.name} behind {port}")
             say_next(_deployment(args.robot, str(port)))
             sys.stdout.flush()
             if args.realtime and prefer_this_thread() is not None:

@@ -178,8 +178,6 @@ class EmulatedDrive:
             torque = law.position(command, position, velocity, dt)
         elif mode is DriveMode.ZERO_VELOCITY:
             torque = law.zero_velocity(command.kd_scale, velocity)
-        elif mode is DriveMode.STAY_WITHIN:
-            torque = law.stay_within(command, position, velocity)
         elif mode is DriveMode.BRAKE:
             return -self._brake * velocity
         else:

@@ -1,7 +1,7 @@
 """The drives' mode machine: what a command leads to, what faults and silence lead to.
 
 stopped --any command--> enabling -> calibrating --8.5 ms--> the commanded mode
-position, stay-within --silence longer than its timeout--> timeout (11)
+position --silence longer than its timeout--> timeout (11)
 any but stopped --fault--> fault (1)
 timeout and fault leave only through stop
 """
@@ -42,7 +42,7 @@ _ENABLING_TIME = 0.001  # From stopped to calibrating, s
 STARTING_TIME = 0.0085
 """From stopped to the commanded mode, s."""
 
-_WATCHED = (DriveMode.POSITION, DriveMode.STAY_WITHIN)
+_WATCHED = (DriveMode.POSITION,)
 
 
 class ModeMachine:

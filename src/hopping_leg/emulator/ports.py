@@ -1,8 +1,4 @@
-"""The adapter between host and drives: a terminal that passes for an fdcanusb, or a CAN bus.
-
-``udp_multicast`` needs neither root nor a kernel that knows CAN; ``socketcan`` on a ``vcan`` works
-as well where there is one.
-"""
+"""The adapter between host and drives: a serial line that passes for an fdcanusb's."""
 
 import contextlib
 import os
@@ -11,16 +7,10 @@ import tty
 from abc import ABC, abstractmethod
 from pathlib import Path
 
-import can
-
 from hopping_leg import locks
 from hopping_leg.deploy.frames import Frame, LineBuffer, split_checksum, with_checksum
-from hopping_leg.deploy.transport import message_of, open_bus
 from hopping_leg.emulator.reply_queue import QueuedReply
 from hopping_leg.errors import UsageError
-
-DEFAULT_CHANNELS = {"udp_multicast": "239.74.163.2", "socketcan": "vcan0"}
-"""Interfaces of python-can that the emulator serves, with the channel that it takes by default."""
 
 
 class LineProtocol:
@@ -174,74 +164,3 @@ def _flipped(line: bytes, digits: int, flip: int) -> bytes:
     which, how = flip % digits, flip // digits % 15 + 1
     at = line.index(b" ", line.index(b" ") + 1) + 1 + which
     return line[:at] + b"%X" % (int(line[at : at + 1], 16) ^ how) + line[at + 1 :]
-
-
-class CanPort:
-    """One node on a CAN-FD bus that speaks for both drives; see ``DEFAULT_CHANNELS``.
-
-    Raises:
-        UsageError: The bus cannot be opened, or has drives already.
-    """
-
-    def __init__(self, interface: str = "udp_multicast", channel: str | None = None) -> None:
-        self.interface = interface
-        self.channel = channel or DEFAULT_CHANNELS[interface]
-        self._lock = locks.named_lock(f"emulator-{self}", f"{self}", UsageError)
-        self._bus: can.BusABC | None = None
-        self.plug_in()
-
-    def __str__(self) -> str:
-        return f"{self.interface}:{self.channel}"
-
-    @property
-    def plugged(self) -> bool:
-        """Whether the drives are on the bus."""
-        return self._bus is not None
-
-    def plug_in(self) -> None:
-        """Join the bus; a ``UsageError`` tells why it cannot be opened."""
-        try:
-            self._bus = open_bus(self.interface, self.channel)
-        except (can.CanError, OSError, ImportError) as error:
-            raise UsageError(
-                f"Cannot open {self.interface} '{self.channel}': {error}; udp_multicast needs a"
-                " network interface that knows multicast and the package msgpack."
-            ) from error
-
-    def unplug(self) -> None:
-        """Leave the bus: the host's frames are heard by nobody."""
-        if self._bus is not None:
-            self._bus.shutdown()
-            self._bus = None
-
-    def close(self) -> None:
-        """Leave it for good."""
-        self.unplug()
-        self._lock.close()
-
-    def fileno(self) -> int:
-        """Return the descriptor to wait for; -1 while unplugged."""
-        return -1 if self._bus is None else int(self._bus.fileno())
-
-    def receive(self) -> list[Frame]:
-        """Return frames that were sent on the bus."""
-        frames: list[Frame] = []
-        while self._bus is not None:
-            try:
-                message = self._bus.recv(timeout=0)
-            except can.CanError:
-                continue  # noise that is no frame
-            if message is None:
-                break
-            frames.append(Frame(message.arbitration_id, bytes(message.data)))
-        return frames
-
-    def send(self, item: QueuedReply) -> None:
-        """Send a frame; noise and corrupted frames are discarded by CAN controllers."""
-        if self._bus is None or item.frame is None or item.flip >= 0:
-            return
-        self._bus.send(message_of(item.frame))
-
-
-Port = LinePort | CanPort
-"""The adapter between host and drives."""

@@ -8,14 +8,16 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 from moteus.protocol import Register
 
 from hopping_leg.arrays import Array
+from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.deploy.frames import Frame
 from hopping_leg.deploy.preflight import required_settings
-from hopping_leg.emulator import bus, leg, settings, wire_log
+from hopping_leg.emulator import bus, leg, settings
 from hopping_leg.emulator.drive import EmulatedDrive
 from hopping_leg.emulator.faults import KINDS, Delivery, Fault, FaultKind
 from hopping_leg.emulator.reply_queue import QueuedReply, TimedQueue
@@ -24,6 +26,16 @@ from hopping_leg.robot import JOINTS, REGISTER_MAP, Robot
 _MODEL = 0x0000  # Board r4
 _FIRMWARE = 0x010D  # Firmware version in its binary-coded form
 _AIRBORNE = 0.01  # Height of the foot in a flight that counts as the first, m: no bounce
+
+
+class Observer(Protocol):
+    """Who is told what goes over the wire; times in s, joint 0 is the hip, 1 the knee."""
+
+    def record(self, time: float, joint: int, message: bus.Message, answer: Frame | None) -> None:
+        """Take what the host sent to a drive, and the drive's answer."""
+
+    def record_mode(self, time: float, joint: int, mode: DriveMode) -> None:
+        """Take a drive's mode after a step."""
 
 
 class EmulatedRobot:
@@ -60,7 +72,7 @@ class EmulatedRobot:
         self.reply_queue = TimedQueue[QueuedReply]()  # What is on its way to the host
         self.wire_time = 0.0  # What a reply takes at least, s
         self.plugged = True  # Whether the adapter is plugged in
-        self.log = wire_log.WireLog()  # What went over the wire
+        self.observer: Observer | None = None  # Of what goes over the wire
         self._sense()
         self.fault_injector = FaultInjector(self, faults, self._rng)
 
@@ -97,9 +109,9 @@ class EmulatedRobot:
                 continue
             errors = [] if late else bus.act(message, drive, self.time)
             answer = bus.answer(message, drive, self.time, errors)
-            self.log.record_command(self.time, joint, message)
+            if self.observer is not None:
+                self.observer.record(self.time, joint, message, answer)
             if answer is not None:
-                self.log.record_reply(self.time, joint, answer)
                 self.fault_injector.send(answer, joint)
 
     def _step(self) -> None:
@@ -118,7 +130,8 @@ class EmulatedRobot:
     def _sense(self) -> None:
         for joint, drive in enumerate(self.drives):
             drive.update_sensors(*self.leg.sensed(joint))
-            self.log.record_mode(self.time, joint, drive)
+            if self.observer is not None:
+                self.observer.record_mode(self.time, joint, drive.machine.mode)
 
 
 def _identity(seed: str) -> dict[int, int]:

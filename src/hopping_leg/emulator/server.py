@@ -16,7 +16,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.leg import TIMESTEP
-from hopping_leg.emulator.ports import DEFAULT_CHANNELS, CanPort, Port, PtyPort
+from hopping_leg.emulator.ports import LinePort, PtyPort
 from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, kinematics, load_robot
@@ -26,8 +26,6 @@ _LENGTHS = {"stand": 0.69, "crouch": 0.5, "stretch": 0.93}
 
 POSES = (*_LENGTHS, "zero")
 """Named poses; ``zero`` is the leg straight down, where the joints' angles are zero."""
-
-_PTY = "pty"  # A serial terminal, as an fdcanusb's
 
 
 @dataclass(frozen=True)
@@ -48,10 +46,6 @@ class EmulatorConfig:
     """Seed of sensor noise and jitter."""
     faults: tuple[Fault, ...] = ()
     """What goes wrong, and when."""
-    interface: str = _PTY
-    """How the host reaches it: ``pty`` or a bus of python-can, see ``ports``."""
-    channel: str | None = None
-    """Channel of a bus; none takes the interface's default."""
     link: Path | None = None
     """Also offer the terminal under this path, which stays the same when it is plugged again."""
 
@@ -74,21 +68,13 @@ class EmulatorConfig:
             faults=self.faults,
         )
 
-    def open(self) -> Port:
+    def open(self) -> PtyPort:
         """Return the adapter.
 
         Raises:
-            UsageError: The interface has no such option or cannot be opened.
+            UsageError: The link is another emulator's, or no link.
         """
-        if self.interface == _PTY:
-            if self.channel is not None:
-                raise UsageError("A channel is for CAN buses; a pty has a link.")
-            return PtyPort(self.link)
-        if self.link is not None:
-            raise UsageError("A link is for the interface pty; a CAN bus has a channel.")
-        if self.interface not in DEFAULT_CHANNELS:
-            raise UsageError(unknown_name("interface", self.interface, (_PTY, *DEFAULT_CHANNELS)))
-        return CanPort(self.interface, self.channel)
+        return PtyPort(self.link)
 
 
 def posture(robot: Robot, pose: str) -> Array:
@@ -120,7 +106,7 @@ _NOTICED = 0.005
 class Server:
     """Runs an emulated robot behind a port."""
 
-    def __init__(self, robot: EmulatedRobot, port: Port) -> None:
+    def __init__(self, robot: EmulatedRobot, port: LinePort) -> None:
         self.robot, self.port = robot, port
         self.on_turn: Callable[[], None] = lambda: None
         """Called after every step, e.g. to show the state."""
@@ -162,7 +148,7 @@ class Server:
         self.robot.advance(now)
 
 
-def serve(robot: EmulatedRobot, port: Port, *, ready: bool) -> bool:
+def serve(robot: EmulatedRobot, port: LinePort, *, ready: bool) -> bool:
     """Hand over what is due between host and robot, and pull or push the plug.
 
     ``ready`` tells that the host may have sent something; returns whether the host has something.
@@ -182,7 +168,7 @@ def serve(robot: EmulatedRobot, port: Port, *, ready: bool) -> bool:
     return True
 
 
-def _deliver(robot: EmulatedRobot, port: Port) -> bool:
+def _deliver(robot: EmulatedRobot, port: LinePort) -> bool:
     """Send what is due; return whether there was anything."""
     items = robot.reply_queue.take(robot.time)
     for item in items:

@@ -1,6 +1,6 @@
 """From a command to the output's torque: the firmware's PD, zero velocity and limits.
 
-The integral term, flux braking and power limits are left out: a qdd100 has none configured.
+The integral term, trajectories, flux braking and power limits are left out.
 """
 
 import math
@@ -19,23 +19,9 @@ COMMAND_FIELDS: dict[int, str] = {
     Register.COMMAND_KP_SCALE: "kp_scale",
     Register.COMMAND_KD_SCALE: "kd_scale",
     Register.COMMAND_POSITION_MAX_TORQUE: "max_torque",
-    Register.COMMAND_STOP_POSITION: "stop_position",
     Register.COMMAND_TIMEOUT: "timeout",
-    Register.COMMAND_VELOCITY_LIMIT: "velocity_limit",
-    Register.COMMAND_ACCEL_LIMIT: "accel_limit",
-    Register.COMMAND_FIXED_VOLTAGE_OVERRIDE: "fixed_voltage",
     Register.COMMAND_ILIMIT_SCALE: "ilimit_scale",
-    Register.COMMAND_FIXED_CURRENT_OVERRIDE: "fixed_current",
     Register.COMMAND_IGNORE_POSITION_BOUNDS: "ignore_bounds",
-    Register.COMMAND_WITHIN_LOWER_BOUND: "lower",
-    Register.COMMAND_WITHIN_UPPER_BOUND: "upper",
-    Register.COMMAND_WITHIN_FEEDFORWARD_TORQUE: "feedforward",
-    Register.COMMAND_WITHIN_KP_SCALE: "kp_scale",
-    Register.COMMAND_WITHIN_KD_SCALE: "kd_scale",
-    Register.COMMAND_WITHIN_MAX_TORQUE: "max_torque",
-    Register.COMMAND_WITHIN_TIMEOUT: "timeout",
-    Register.COMMAND_WITHIN_ILIMIT_SCALE: "ilimit_scale",
-    Register.COMMAND_WITHIN_IGNORE_POSITION_BOUNDS: "ignore_bounds",
 }
 """Register to the field of ``Command`` that it holds."""
 
@@ -53,16 +39,9 @@ class Command:
     kd_scale: float = 1.0
     ilimit_scale: float = 1.0
     max_torque: float = 100.0
-    stop_position: float = math.nan
     timeout: float = 0.0
     """0 takes the configured default, NaN never times out."""
-    velocity_limit: float = math.nan
-    accel_limit: float = math.nan
-    fixed_voltage: float = math.nan
-    fixed_current: float = math.nan
     ignore_bounds: float = 0.0
-    lower: float = 0.0
-    upper: float = 0.0
 
 
 TORQUE_CONSTANT = 0.0275
@@ -97,29 +76,14 @@ class TorqueLaw:
     def position(self, command: Command, position: float, velocity: float, dt: float) -> float:
         """Return the torque of position mode, N m; see the firmware's ``ISR_DoPositionCommon``."""
         self._head_for(command, position, dt)
-        stiff, damp = self._gains(command)
-        torque = command.feedforward + damp * (self.control_velocity - velocity)
-        if stiff:
-            torque += stiff * (self.control_position - position)
+        torque = command.feedforward
+        torque += self._kd * command.kd_scale * (self.control_velocity - velocity)
+        torque += self._kp * command.kp_scale * (self.control_position - position)
         return self._within(torque, command.max_torque)
-
-    def _gains(self, command: Command) -> tuple[float, float]:
-        return self._kp * command.kp_scale, self._kd * command.kd_scale
 
     def zero_velocity(self, kd_scale: float, velocity: float) -> float:
         """Return the torque of zero-velocity mode, N m."""
         return self._within(-self._kd * kd_scale * velocity, self._timeout_torque)
-
-    def stay_within(self, command: Command, position: float, velocity: float) -> float:
-        """Return the torque of stay-within mode, N m: none but feedforward inside the bounds."""
-        low = math.nan if math.isnan(command.lower) else max(command.lower, position)
-        high = math.nan if math.isnan(command.upper) else min(command.upper, position)
-        target = low if low > position else high if high < position else None
-        torque = command.feedforward
-        if target is not None:
-            stiff, damp = self._gains(command)
-            torque += stiff * (target - position) - damp * velocity
-        return self._within(torque, command.max_torque)
 
     def limited(
         self, torque: float, position: float, velocity: float, temperature: float, *, bounds: bool
@@ -161,24 +125,14 @@ class TorqueLaw:
         return torque
 
     def _head_for(self, command: Command, position: float, dt: float) -> None:
-        """Move the control position: at once, or as fast as the velocity limit allows."""
-        speed = 0.0 if math.isnan(command.velocity) else command.velocity
+        """Move the control position: at once where one is told, else with the velocity."""
+        self.control_velocity = 0.0 if math.isnan(command.velocity) else command.velocity
         if math.isnan(self.control_position):
             self.control_position = position
-        self.control_velocity = speed
-        target = command.position
-        if math.isnan(target):
-            self.control_position += speed * dt
-        elif math.isnan(command.velocity_limit):
-            self.control_position, command.position = target, math.nan
+        if math.isnan(command.position):
+            self.control_position += self.control_velocity * dt
         else:
-            reach = command.velocity_limit * dt
-            gap = target - self.control_position
-            self.control_position += min(max(gap, -reach), reach)
-            if abs(gap) <= reach:
-                command.position = math.nan
-            else:
-                self.control_velocity = math.copysign(command.velocity_limit, gap)
+            self.control_position, command.position = command.position, math.nan
         if not math.isnan(self._high):
             self.control_position = min(self.control_position, self._high)
         if not math.isnan(self._low):
@@ -187,9 +141,7 @@ class TorqueLaw:
 
 WITH_BOUNDS = (
     DriveMode.POSITION,
-    DriveMode.STAY_WITHIN,
     DriveMode.ZERO_VELOCITY,
     DriveMode.TIMEOUT,
-    DriveMode.CURRENT,
 )
 """Modes in which the position limits take outward torque away."""

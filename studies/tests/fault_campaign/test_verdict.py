@@ -4,13 +4,13 @@ from types import SimpleNamespace
 import pytest
 
 from hopping_leg.deploy.drive_link import DriveMode
-from hopping_leg.emulator.wire_log import CommandEvent, ReplyEvent
 from studies.fault_campaign.verdict import (
     Limits,
     problems_of_commands,
     reaction,
     restarts,
 )
+from studies.fault_campaign.wire_log import CommandEvent, ReplyEvent
 
 LIMITS = Limits((10.0, 10.0), (18.0, 42.0), 65.0)
 

@@ -11,11 +11,11 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
-from hopping_leg.emulator import ports, wire_log
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.emulator.server import EmulatorConfig, Server
 from hopping_leg.errors import UsageError
+from studies.fault_campaign.wire_log import WireLog
 
 _SAMPLE_SECONDS = 0.01
 _PATIENCE = 60.0
@@ -38,14 +38,14 @@ class EmulatorState:
 class EmulatorRecord:
     """What happened since the start."""
 
-    log: wire_log.WireLog
+    log: WireLog
     """Commands and answers on the wire."""
     faults: tuple[tuple[float, Fault], ...]
     """Those that began, with when, s."""
 
 
 class EmulatorProcess:
-    """A running emulator; ``path`` is the terminal that the host opens, empty for a CAN bus.
+    """A running emulator; ``path`` is the terminal that the host opens.
 
     Raises:
         UsageError: The process did not start; the message says why.
@@ -114,6 +114,7 @@ def _serve(start: EmulatorConfig, pipe: Connection) -> None:
     """Run in the process: serve the terminal until the pipe is closed."""
     try:
         robot, port = start.build(), start.open()
+        robot.observer = log = WireLog()
     except Exception as error:
         pipe.send(str(error))
         return
@@ -125,15 +126,15 @@ def _serve(start: EmulatorConfig, pipe: Connection) -> None:
             truth.append((robot.time, robot.leg.height, robot.leg.foot_clearance))
 
     server.on_turn = watch
-    pipe.send(port.path if isinstance(port, ports.PtyPort) else Path())
+    pipe.send(port.path)
     prefer_this_thread()
     with uninterrupted():
-        server.run(lambda: not _answer_parent(pipe, robot, truth))
+        server.run(lambda: not _answer_parent(pipe, robot, log, truth))
     port.close()
 
 
 def _answer_parent(
-    pipe: Connection, robot: EmulatedRobot, truth: list[tuple[float, float, float]]
+    pipe: Connection, robot: EmulatedRobot, log: WireLog, truth: list[tuple[float, float, float]]
 ) -> bool:
     """Answer what the parent asked; return whether it is still there."""
     try:
@@ -142,7 +143,7 @@ def _answer_parent(
             if isinstance(request, Fault):
                 robot.fault_injector.add(request)
             if request == "record":
-                pipe.send(EmulatorRecord(robot.log, tuple(robot.fault_injector.log)))
+                pipe.send(EmulatorRecord(log, tuple(robot.fault_injector.log)))
             elif request == "truth":
                 pipe.send(truth)
             else:

@@ -13,7 +13,6 @@ from moteus.protocol import Register, parse_reply
 from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.deploy.frames import Frame
 from hopping_leg.emulator import bus, mode_machine
-from hopping_leg.emulator.drive import EmulatedDrive
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,18 +61,16 @@ class WireLog:
         self.changes: deque[ModeChange] = deque(maxlen=_REMEMBERED)
         self._modes = [DriveMode.STOPPED, DriveMode.STOPPED]
 
-    def record_command(self, time: float, joint: int, message: bus.Message) -> None:
-        """Note what the host sent to a drive, if it wrote the drive's mode."""
+    def record(self, time: float, joint: int, message: bus.Message, answer: Frame | None) -> None:
+        """Note what the host sent to a drive, if it wrote the drive's mode, and the answer."""
+        if answer is not None:
+            self._replies.append((time, joint, answer.data))
         written = {s.register: s.value or 0.0 for s in message.writes}
         if written.get(Register.MODE) in mode_machine.MODES:
             mode = DriveMode(int(written[Register.MODE]))
             torque = float(written.get(Register.COMMAND_FEEDFORWARD_TORQUE, 0.0))
             most = float(written.get(Register.COMMAND_POSITION_MAX_TORQUE, 0.0))
             self._commands.append(CommandEvent(time, joint, mode, torque, most))
-
-    def record_reply(self, time: float, joint: int, answer: Frame) -> None:
-        """Note a drive's answer."""
-        self._replies.append((time, joint, answer.data))
 
     @property
     def commands(self) -> Sequence[CommandEvent]:
@@ -96,9 +93,8 @@ class WireLog:
                     values[Register.TEMPERATURE],
                 )
 
-    def record_mode(self, time: float, joint: int, drive: EmulatedDrive) -> None:
+    def record_mode(self, time: float, joint: int, mode: DriveMode) -> None:
         """Note a drive's mode after a step, if it is another."""
-        mode = drive.machine.mode
         if mode is not self._modes[joint]:
             self._modes[joint] = mode
             self.changes.append(ModeChange(time, joint, mode))
