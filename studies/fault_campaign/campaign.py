@@ -1,13 +1,11 @@
 """The whole campaign: every family, again and again, for every controller; it may be interrupted.
 
-Finished trials are kept in a file, one JSON line each, and are not repeated.
+Finished trials are kept, some of a kind in a file, and are not repeated.
 """
 
-import json
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import as_completed
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from importlib.metadata import version
@@ -16,41 +14,34 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
-from hopping_leg.cli.options import at_least
+from hopping_leg.cli.options import JsonFile, RobotFile, at_least, say, show_table
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.progress import ShareProgress
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
-from hopping_leg.terminal import plain_console
-from hopping_leg.workers import ProcessWorkers
 from studies.fault_campaign.case import Case, Result
 from studies.fault_campaign.families import FAMILIES
 from studies.fault_campaign.live import LIVE, play_live
 from studies.fault_campaign.trial import play
-from studies.shared import host
+from studies.shared import Row, do_all, host
 
-_TRIALS = "trials.jsonl"
-_ABOUT = "campaign.json"
 _SHOWN = 50
 """Unsafe trials that are told in full."""
 
-Row = dict[str, Any]
-"""A trial: its case and its result."""
+_BLOCK = 25
+"""Trials that a file keeps."""
 
 
 @dataclass(frozen=True)
-class Campaign:
-    """What is tried.
+class Faults:
+    """Let everything go wrong that can, at random moments of the hop cycle; count what is unsafe.
 
-    Raises:
-        UsageError: A family is unknown.
+    Trials run in virtual time behind the emulated wire and are exact; some run in real time, too,
+    and measure how soon the host reacts, fairly on an idle computer only. Interrupted, it goes on.
     """
 
     controllers: tuple[str, ...] = ("fast", "energy-shaping")
     """Shipped names or files."""
-    robot: str = DEFAULT_ROBOT
-    """The leg behind the wire: a shipped name or the path of a .toml file."""
+    robot: RobotFile = DEFAULT_ROBOT
     families: tuple[str, ...] = tuple(FAMILIES)
     """Families of faults."""
     repeats: int = 100
@@ -59,61 +50,48 @@ class Campaign:
     """Of them in real time, of the families that show in an answer: they measure reactions."""
     seed: int = 0
     """Of moments, values and drives."""
+    workers: int = 0
+    """Processes, 0 for one per core; results do not depend on it."""
+    out: Path = Path("runs/bench-faults")
+    """Where finished trials are kept; they are not repeated."""
+    json: JsonFile = None
 
-    def __post_init__(self) -> None:
+    def measure(self) -> Row:
+        """Run what is not done yet; print a table, return every number.
+
+        Those in real time come last, one after the other: they have the computer for themselves.
+        """
+        at_least(1, repeats=self.repeats)
+        at_least(0, seed=self.seed, workers=self.workers, live=self.live)
         for name in self.families:
             if name not in FAMILIES:
                 raise UsageError(unknown_name("fault family", name, FAMILIES))
+        robot = load_robot(self.robot)
+        robot.require_leg()
+        blocks = do_all(self._blocks(robot, live=False), self.workers)
+        blocks += do_all(self._blocks(robot, live=True))
+        result = summary(self, robot, [row for block in blocks for row in block["trials"]])
+        show(result)
+        return result
 
-    def cases(self) -> Iterator[Case]:
-        """Yield all trials, so that every family is tried early; those in real time come last."""
-        shown = [family for family in self.families if family in LIVE]
-        for live, repeats, families in (
-            (False, self.repeats, self.families),
-            (True, self.live, shown),
+    def _blocks(self, robot: Robot, *, live: bool) -> Iterator[tuple[Any, ...]]:
+        """Yield the jobs, so that every family is tried early."""
+        families = [name for name in self.families if name in LIVE] if live else self.families
+        repeats = self.live if live else self.repeats
+        for first, family, controller in product(
+            range(0, repeats, _BLOCK), families, self.controllers
         ):
-            for index, family, controller in product(range(repeats), families, self.controllers):
-                yield Case(family, controller, self.robot, index, self.seed, live)
+            cases = [
+                Case(family, controller, self.robot, index, self.seed, live)
+                for index in range(first, min(first + _BLOCK, repeats))
+            ]
+            asked = {"robot": robot.digest, "version": version("hopping-leg"),
+                     "cases": [asdict(case) for case in cases]}  # fmt: skip
+            name = f"{family}-{Path(controller).stem}-{first}{'-live' if live else ''}.json"
+            yield self.out / name.replace(" ", "-"), asked, play_block, cases
 
 
-def run_campaign(
-    campaign: Campaign,
-    folder: Path,
-    *,
-    workers: int = 0,
-    on_trial: Callable[[int, int, int], None] = lambda _done, _total, _unsafe: None,
-) -> dict[str, Any]:
-    """Run what is not done yet; return the summary of all trials.
-
-    Args:
-        campaign: What is tried.
-        folder: Where finished trials are kept.
-        workers: Processes, 0 for one per core.
-        on_trial: Called with (trials done, trials in all, unsafe ones so far).
-
-    Raises:
-        UsageError: The folder holds another campaign.
-    """
-    robot = load_robot(campaign.robot)
-    robot.require_leg()
-    _claim(folder, campaign, robot)
-    rows = _load(folder / _TRIALS)
-    cases = list(campaign.cases())
-    wanted = {_key(asdict(case)) for case in cases}
-    rows = [row for row in rows if _key(row) in wanted]
-    done = {_key(row) for row in rows}
-    missing = [case for case in cases if _key(asdict(case)) not in done]
-    on_trial(len(rows), len(cases), _unsafe(rows))
-    with (folder / _TRIALS).open("a", encoding="utf-8") as file:
-        for row in _run(missing, workers):
-            file.write(json.dumps(row) + "\n")
-            file.flush()
-            rows.append(row)
-            on_trial(len(rows), len(cases), _unsafe(rows))
-    return summary(campaign, robot, rows)
-
-
-def summary(campaign: Campaign, robot: Robot, rows: Sequence[Row]) -> dict[str, Any]:
+def summary(campaign: Faults, robot: Robot, rows: Sequence[Row]) -> Row:
     """Return the campaign's numbers."""
     fair = [row for row in rows if not row["disturbed"]]
     measured = [row for row in fair if row["live"]] or fair
@@ -140,7 +118,7 @@ def summary(campaign: Campaign, robot: Robot, rows: Sequence[Row]) -> dict[str, 
     }
 
 
-def _family_row(name: str, rows: Sequence[Row]) -> dict[str, Any]:
+def _family_row(name: str, rows: Sequence[Row]) -> Row:
     own = [row for row in rows if row["family"] == name]
     fair = [row for row in own if not row["disturbed"]]
     reactions = [row["reaction"] for row in fair if row["reaction"] is not None]
@@ -163,57 +141,9 @@ def _unsafe(rows: Sequence[Row]) -> int:
     return sum(bool(row["problems"]) for row in rows)
 
 
-def _key(row: Row) -> tuple[str, str, int, int, bool]:
-    return row["family"], row["controller"], row["index"], row["seed"], row["live"]
-
-
-def _claim(folder: Path, campaign: Campaign, robot: Robot) -> None:
-    """Refuse to mix trials of another leg or version with these."""
-    about = {"robot_digest": robot.digest, "version": version("hopping-leg")}
-    folder.mkdir(parents=True, exist_ok=True)
-    file = folder / _ABOUT
-    if not file.exists():
-        file.write_text(json.dumps(about), encoding="utf-8")
-    elif json.loads(file.read_text(encoding="utf-8")) != about:
-        raise UsageError(
-            f"{folder} holds trials of another leg or version than {campaign.robot};"
-            " give another --out or remove it."
-        )
-
-
-def _load(file: Path) -> list[Row]:
-    """Return the finished trials; a line that was cut off by a kill is dropped."""
-    if not file.exists():
-        return []
-    rows, whole = [], b""
-    for line in file.read_bytes().splitlines(keepends=True):
-        try:
-            rows.append(json.loads(line))
-        except json.JSONDecodeError:
-            break
-        whole += line
-    file.write_bytes(whole)
-    return rows
-
-
-def _run(cases: Sequence[Case], workers: int) -> Iterator[Row]:
-    """Yield rows as they come; what is timed has the computer for itself.
-
-    The slow ones come first, so that the time left does not rise.
-    """
-    for case in cases:
-        if case.live:
-            yield play_case(case)
-    yield from _run_virtual([case for case in cases if not case.live], workers)
-
-
-def _run_virtual(cases: Sequence[Case], workers: int) -> Iterator[Row]:
-    with ProcessWorkers(workers) as processes:
-        if min(processes.count, len(cases)) <= 1:
-            yield from map(play_case, cases)
-            return
-        for future in as_completed([processes.submit(play_case, case) for case in cases]):
-            yield future.result()
+def play_block(cases: Sequence[Case]) -> Row:
+    """Run some trials."""
+    return {"trials": [play_case(case) for case in cases]}
 
 
 def play_case(case: Case) -> Row:
@@ -233,63 +163,29 @@ def _robot(name: str) -> Robot:
     return load_robot(name)
 
 
-@dataclass(frozen=True)
-class Faults(Campaign):
-    """Let everything go wrong that can, at random moments of the hop cycle; count what is unsafe.
-
-    Trials run in virtual time behind the emulated wire and are exact; some run in real time, too,
-    and measure how soon the host reacts, fairly on an idle computer only. Interrupted, it goes on.
-    """
-
-    workers: int = 0
-    """Processes, 0 for one per core; results do not depend on it."""
-    out: Path = Path("runs/bench-faults")
-    """Where finished trials are kept; they are not repeated."""
-    json: Path | None = None
-    """Write every number to this file."""
-
-    def measure(self) -> dict[str, Any]:
-        """Run it, print a table, return every number."""
-        at_least(1, repeats=self.repeats)
-        at_least(0, seed=self.seed, workers=self.workers, live=self.live)
-        with ShareProgress() as bar:
-            result = run_campaign(
-                self,
-                self.out,
-                workers=self.workers,
-                on_trial=lambda done, total, unsafe: bar.show(
-                    f"trials, {unsafe} unsafe", done / total
-                ),
-            )
-        _print(result)
-        return result
-
-
-def _print(result: dict[str, Any]) -> None:
-    table = Table("family", "trials", "unsafe", "ended for", "reaction 99 %, ms")
-    for row in result["rows"]:
-        reasons = ", ".join(f"{name.lower()} {n}" for name, n in row["reasons"].items())
-        table.add_row(
-            row["family"],
-            str(row["trials"]),
-            str(row["unsafe"]),
-            reasons,
-            _ms(row["reaction_p99_s"]),
-        )
-    console = plain_console()
-    console.print(table)
-    console.print(
+def show(result: Row) -> None:
+    """Print the campaign's table and what was unsafe."""
+    show_table(
+        ("family", "trials", "unsafe", "ended for", "reaction 99 %, ms"),
+        (
+            (row["family"], row["trials"], row["unsafe"],
+             ", ".join(f"{name.lower()} {n}" for name, n in row["reasons"].items()),
+             _ms(row["reaction_p99_s"]))
+            for row in result["rows"]
+        ),
+    )  # fmt: skip
+    say(
         f"{result['trials']} trials, {result['unsafe']} unsafe. Bad answer to safe command:"
         f" {_ms(result['reaction_p99_s'])} ms at 99 %. Host's death to brake:"
         f" {_ms(result['host_death_to_brake_max_s'])} ms at most."
     )
     if result["disturbed_trials"]:
-        console.print(
+        say(
             f"{result['disturbed_trials']} of {result['live_trials']} trials in real time ended"
             " safely before their time as the computer was too busy; they tell nothing."
         )
     for row in result["unsafe_trials"]:
-        console.print(f"{row['family']}, {row['controller']}, {row['what']}: {row['problems'][0]}")
+        say(f"{row['family']}, {row['controller']}, {row['what']}: {row['problems'][0]}")
 
 
 def _ms(seconds: float | None) -> str:

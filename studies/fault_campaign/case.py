@@ -124,44 +124,30 @@ class Scene:
             home(link, hopping_poses(self.robot).start.tolist())
         require_fit(check_drives(self.robot, self.safety_limits, inspect(link)))
 
-    def perform(
-        self,
-        link: MoteusLink,
-        folder: Path,
-        clock: Clock | None,
-        *,
-        realtime: bool,
-        threaded: bool = True,
-    ) -> Performance:
-        """Let the leg rise, hop beyond the mishap, sink and stop; see ``perform``.
+    def perform(self, link: MoteusLink, folder: Path, clock: Clock | None = None) -> Performance:
+        """Let the leg rise, hop beyond the mishap, sink and stop; in real time without a clock.
 
         Raises:
             HardwareError: The drives may not be armed.
             KeyboardInterrupt: A signal stopped the leg.
         """
         controller = load_controller(self.case.controller, self.robot)
+        timing = SequenceTiming() if self.family.grounded else _TIMING
         sequence = MotionSequence(
             with_fallback(controller, self.robot),
             CommandSchedule(((self.height, 100.0),)),
             hopping_poses(self.robot),
             SoftLimiter(self.robot, SoftLimits()),
-            dataclasses.replace(
-                SequenceTiming() if self.family.grounded else _TIMING,
-                hop=_FIRST_HOP + self.mishap.at + _AFTERWARDS,
-            ),
+            dataclasses.replace(timing, hop=_FIRST_HOP + self.mishap.at + _AFTERWARDS),
             checked=self.robot if self.family.grounded else None,
         )
         self.require_fitness(link)
+        header, file = header_of(self.robot, controller, CONTROL_RATE), folder / "run.parquet"
+        real = clock is None
         done = perform(
-            link,
-            sequence,
-            self.safety_limits,
-            folder / "run.parquet",
-            header_of(self.robot, controller, CONTROL_RATE),
-            clock=clock,
-            realtime=realtime,
-            threaded=threaded,
-        )
+            link, sequence, self.safety_limits, file, header, clock=clock, realtime=real,
+            threaded=real or self.mishap.dies,
+        )  # fmt: skip
         memory = done.outcome.supervisor
         if Reason.OPERATOR_STOP in (memory.cause.reason, memory.stop_cause.reason):
             raise KeyboardInterrupt

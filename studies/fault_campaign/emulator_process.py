@@ -17,7 +17,6 @@ from hopping_leg.emulator.server import EmulatorConfig, Server
 from hopping_leg.errors import UsageError
 from studies.fault_campaign.wire_log import WireLog
 
-_SAMPLE_SECONDS = 0.01
 _PATIENCE = 60.0
 """Longest wait for an answer of the process, s; importing takes long on a busy machine."""
 
@@ -74,12 +73,6 @@ class EmulatorProcess:
         assert isinstance(record, EmulatorRecord)
         return record
 
-    def truth(self) -> list[tuple[float, float, float]]:
-        """Return time, s, base height, m, and the foot's clearance, m, every 10 ms until now."""
-        truth = self._ask("truth")
-        assert isinstance(truth, list)
-        return truth
-
     def inject(self, fault: Fault) -> None:
         """Let a fault happen; its time counts from now."""
         self._ask(fault)
@@ -119,38 +112,27 @@ def _serve(start: EmulatorConfig, pipe: Connection) -> None:
         pipe.send(str(error))
         return
     server = Server(robot, port)
-    truth: list[tuple[float, float, float]] = []
-
-    def watch() -> None:
-        if not truth or robot.time >= truth[-1][0] + _SAMPLE_SECONDS:
-            truth.append((robot.time, robot.leg.height, robot.leg.foot_clearance))
-
-    server.on_turn = watch
     pipe.send(port.path)
     prefer_this_thread()
     with uninterrupted():
-        server.run(lambda: not _answer_parent(pipe, robot, log, truth))
+        server.run(lambda: not _answer_parent(pipe, robot, log))
     port.close()
 
 
-def _answer_parent(
-    pipe: Connection, robot: EmulatedRobot, log: WireLog, truth: list[tuple[float, float, float]]
-) -> bool:
+def _answer_parent(pipe: Connection, robot: EmulatedRobot, log: WireLog) -> bool:
     """Answer what the parent asked; return whether it is still there."""
+    injector = robot.fault_injector
     try:
         while pipe.poll():
             request = pipe.recv()
             if isinstance(request, Fault):
-                robot.fault_injector.add(request)
+                injector.add(request)
             if request == "record":
-                pipe.send(EmulatorRecord(log, tuple(robot.fault_injector.log)))
-            elif request == "truth":
-                pipe.send(truth)
+                pipe.send(EmulatorRecord(log, tuple(injector.log)))
             else:
                 modes = tuple(int(drive.machine.mode) for drive in robot.drives)
                 q, height = tuple(robot.leg.q.tolist()), robot.leg.height
-                flown = robot.fault_injector.flown
-                pipe.send(EmulatorState(robot.time, modes, q, height, flown))
+                pipe.send(EmulatorState(robot.time, modes, q, height, injector.flown))
     except (EOFError, OSError):
         return False
     return True

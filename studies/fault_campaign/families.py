@@ -1,7 +1,8 @@
 """Families of faults: how one is drawn, and which reason for stopping is a correct one."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -37,6 +38,11 @@ class Mishap:
     at: float = 0.0
 
 
+Draw = Callable[[np.random.Generator], Mishap]
+Values = Callable[[np.random.Generator], dict[str, Any]]
+"""Draws what makes a fault of a kind: its options."""
+
+
 @dataclass(frozen=True)
 class Family:
     """A kind of mishap.
@@ -50,65 +56,48 @@ class Family:
     """
 
     name: str
-    draw: Callable[[np.random.Generator], Mishap]
-    reasons: frozenset[Reason] = field(default=frozenset())
+    draw: Draw
+    reasons: tuple[Reason, ...] = ()
     refused: bool = False
     grounded: bool = False
 
 
-_READINGS = {
-    *(Reason.ENCODER_JUMP, Reason.POSITION_LIMIT, Reason.SPEED_LIMIT, Reason.TORQUE_LIMIT),
-    *(Reason.MEASUREMENT_NOT_FINITE, Reason.TOO_HOT, Reason.VOLTAGE_LOW, Reason.VOLTAGE_HIGH),
-    *(Reason.DRIVE_LEFT_MODE, Reason.DRIVE_FAULT, Reason.DRIVE_TIMEOUT),
-}
-"""What flipped bits may look like where lines have no checksums."""
-
-_GLITCH = {Reason.FINISHED, Reason.REPLIES_MISSING}
+def _drive(rng: np.random.Generator) -> str:
+    return str(rng.choice(["hip", "knee", "both"]))
 
 
-def _faulty(
-    kind: str, options: Callable[[np.random.Generator], dict[str, float | str]]
-) -> Callable[[np.random.Generator], Mishap]:
+def _faulty(kind: str, values: Values = lambda _: {}) -> Draw:
     """Return what draws a fault of a kind at a random time of a random drive."""
 
     def draw(rng: np.random.Generator) -> Mishap:
         at = float(rng.uniform(0, HOP_SECONDS))
-        drive = str(rng.choice(["hip", "knee", "both"]))
-        values = {"drive": drive, **options(rng)}
-        return Mishap(Fault(kind, since="flight", at=at, **values), at=at)  # type: ignore[arg-type]
+        options = {"drive": _drive(rng), **values(rng)}
+        return Mishap(Fault(kind, since="flight", at=at, **options), at=at)
 
     return draw
 
 
-def _nothing(_: np.random.Generator) -> dict[str, float | str]:
-    return {}
-
-
-def _few(rng: np.random.Generator) -> dict[str, float | str]:
+def _few(rng: np.random.Generator) -> dict[str, Any]:
     return {"count": int(rng.integers(1, 6))}
 
 
-def _between(low: float, high: float) -> Callable[[np.random.Generator], dict[str, float | str]]:
+def _between(low: float, high: float) -> Values:
     return lambda rng: {"value": float(rng.uniform(low, high))}
 
 
-def _one_of(codes: list[int]) -> Callable[[np.random.Generator], dict[str, float | str]]:
+def _one_of(codes: list[int]) -> Values:
     return lambda rng: {"value": float(rng.choice(codes))}
 
 
-def _late(rng: np.random.Generator) -> dict[str, float | str]:
+def _either_way(low: float, high: float) -> Values:
+    return lambda rng: {"value": float(rng.choice([-1, 1]) * rng.uniform(low, high))}
+
+
+def _late(rng: np.random.Generator) -> dict[str, Any]:
     return {**_few(rng), "value": float(rng.uniform(0.004, 0.03))}
 
 
-def _jump(rng: np.random.Generator) -> dict[str, float | str]:
-    return {"value": float(rng.choice([-1, 1]) * rng.uniform(0.2, 2.0))}
-
-
-def _drift(rng: np.random.Generator) -> dict[str, float | str]:
-    return {"value": float(rng.choice([-1, 1]) * rng.uniform(0.4, 2.0))}
-
-
-def _unplugged(rng: np.random.Generator) -> dict[str, float | str]:
+def _unplugged(rng: np.random.Generator) -> dict[str, Any]:
     return {"drive": "both", "duration": float(rng.uniform(0.05, 0.6))}
 
 
@@ -125,7 +114,7 @@ def _pose(rng: np.random.Generator) -> Mishap:
     """Miscounted turns of a rotor, or a pose in which the leg may not start."""
     if rng.random() < 0.5:
         turns = float(rng.choice([-3, -2, -1, 1, 2, 3]))
-        drive = str(rng.choice(["hip", "knee", "both"]))
+        drive = _drive(rng)
         return Mishap(start=EmulatorConfig(faults=(Fault("boot_pose", drive=drive, value=turns),)))
     hip, knee = rng.uniform(2.0, 3.0), rng.uniform(0.3, 2.0)
     return Mishap(start=EmulatorConfig(pose=f"{hip:.3f},{knee:.3f}"))
@@ -163,121 +152,97 @@ def _configuration(rng: np.random.Generator) -> Mishap:
     name = str(rng.choice(list(_SETTINGS)))
     fault = Fault(
         "configuration",
-        drive=str(rng.choice(["hip", "knee", "both"])),
+        drive=_drive(rng),
         name=name,
         value=float(rng.choice(_SETTINGS[name])),
     )
     return Mishap(start=EmulatorConfig(faults=(fault,)))
 
 
-_SEVERE: dict[str, Callable[[np.random.Generator], dict[str, float | str]]] = {
-    "silence": _nothing,
-    "power_loss": _nothing,
-    "encoder_jump": _jump,
-    "drive_fault": _one_of([int(code) for code in FaultCode]),
-    "over_voltage": _between(42.5, 60.0),
-    "under_voltage": _between(2.0, 17.5),
+_JUMP, _CODE = _either_way(0.2, 2.0), _one_of([int(code) for code in FaultCode])
+_HIGH, _LOW = _between(42.5, 60.0), _between(2.0, 17.5)
+
+_SEVERE: dict[str, Values] = {
+    "silence": lambda _: {},
+    "power_loss": lambda _: {},
+    "encoder_jump": _JUMP,
+    "drive_fault": _CODE,
+    "over_voltage": _HIGH,
+    "under_voltage": _LOW,
 }
 """Kinds of fault after which no run may go on."""
 
-_SEVERE_REASONS = (
-    *(Reason.REPLIES_MISSING, Reason.DRIVE_LEFT_MODE, Reason.DRIVE_TIMEOUT, Reason.ENCODER_JUMP),
-    *(Reason.DRIVE_FAULT, Reason.VOLTAGE_HIGH, Reason.VOLTAGE_LOW, Reason.POSITION_LIMIT),
-)
 
-
-def _severe(since: str, first: float, last: float) -> Callable[[np.random.Generator], Mishap]:
+def _severe(since: str, first: float, last: float) -> Draw:
     """Return what draws a severe fault of a drive between two times after an event, s."""
 
     def draw(rng: np.random.Generator) -> Mishap:
         kind = str(rng.choice(list(_SEVERE)))
-        at, drive = float(rng.uniform(first, last)), str(rng.choice(["hip", "knee", "both"]))
-        values = {"drive": drive, **_SEVERE[kind](rng)}
-        return Mishap(Fault(kind, since=since, at=at, **values))  # type: ignore[arg-type]
+        at = float(rng.uniform(first, last))
+        options = {"drive": _drive(rng), **_SEVERE[kind](rng)}
+        return Mishap(Fault(kind, since=since, at=at, **options))
 
     return draw
 
 
-_WITHIN = 0.05  # s
-
-
 def _double(rng: np.random.Generator) -> Mishap:
-    """Two severe faults within some ticks of each other."""
+    """Two severe faults within 50 ms of each other."""
     at = float(rng.uniform(0, HOP_SECONDS))
-    first, second = (_severe("flight", at, at + _WITHIN)(rng).fault for _ in range(2))
+    first, second = (_severe("flight", at, at + 0.05)(rng).fault for _ in range(2))
     return Mishap(first, second, at=at)
 
 
-def _family(
-    name: str, draw: Callable[[np.random.Generator], Mishap], *reasons: Reason
-) -> tuple[str, Family]:
-    return name, Family(name, draw, frozenset(reasons))
-
-
 _R = Reason
+_GLITCH = (_R.FINISHED, _R.REPLIES_MISSING)
+_FLIPPED = (
+    _R.ENCODER_JUMP, _R.POSITION_LIMIT, _R.SPEED_LIMIT, _R.TORQUE_LIMIT,
+    _R.MEASUREMENT_NOT_FINITE, _R.TOO_HOT, _R.VOLTAGE_LOW, _R.VOLTAGE_HIGH, _R.DRIVE_LEFT_MODE,
+    _R.DRIVE_FAULT, _R.DRIVE_TIMEOUT,
+)  # fmt: skip
+"""What flipped bits may look like where lines have no checksums."""
+_STOPS = (
+    _R.REPLIES_MISSING, _R.DRIVE_LEFT_MODE, _R.DRIVE_TIMEOUT, _R.ENCODER_JUMP, _R.DRIVE_FAULT,
+    _R.VOLTAGE_HIGH, _R.VOLTAGE_LOW, _R.POSITION_LIMIT,
+)  # fmt: skip
+"""What severe faults are noticed by."""
+_MISWIRED = (_R.STANDS_WRONG, _R.POSITION_LIMIT, _R.SPEED_LIMIT)
+_DRIFT = (_R.ENCODER_DRIFT, _R.ENCODER_JUMP, _R.POSITION_LIMIT)
 
-FAMILIES: dict[str, Family] = dict(
-    [
-        _family("dropped reply", _faulty("drop_reply", _few), *_GLITCH),
-        _family("corrupted reply", _faulty("corrupt_reply", _few), *_GLITCH, *_READINGS),
-        _family("late reply", _faulty("late_reply", _late), *_GLITCH),
-        _family("duplicated reply", _faulty("duplicate_reply", _few), _R.FINISHED),
-        _family("total loss", _faulty("silence", _nothing), _R.REPLIES_MISSING),
-        _family("garbage line", _faulty("garbage_line", _few), _R.FINISHED),
-        _family("encoder jump", _faulty("encoder_jump", _jump), _R.ENCODER_JUMP),
-        _family(
-            "encoder drift",
-            _faulty("encoder_drift", _drift),
-            *(_R.ENCODER_DRIFT, _R.ENCODER_JUMP, _R.POSITION_LIMIT),
-        ),
-        _family(
-            "drive fault",
-            _faulty("drive_fault", _one_of([int(code) for code in FaultCode])),
-            _R.DRIVE_FAULT,
-        ),
-        _family(
+FAMILIES = {
+    family.name: family
+    for family in (
+        Family("dropped reply", _faulty("drop_reply", _few), _GLITCH),
+        Family("corrupted reply", _faulty("corrupt_reply", _few), (*_GLITCH, *_FLIPPED)),
+        Family("late reply", _faulty("late_reply", _late), _GLITCH),
+        Family("duplicated reply", _faulty("duplicate_reply", _few), (_R.FINISHED,)),
+        Family("total loss", _faulty("silence"), (_R.REPLIES_MISSING,)),
+        Family("garbage line", _faulty("garbage_line", _few), (_R.FINISHED,)),
+        Family("encoder jump", _faulty("encoder_jump", _JUMP), (_R.ENCODER_JUMP,)),
+        Family("encoder drift", _faulty("encoder_drift", _either_way(0.4, 2.0)), _DRIFT),
+        Family("drive fault", _faulty("drive_fault", _CODE), (_R.DRIVE_FAULT,)),
+        Family(
             "over-temperature",
             _faulty("over_temperature", _between(100.0, 2000.0)),
-            *(_R.TOO_HOT, _R.DRIVE_FAULT),
+            (_R.TOO_HOT, _R.DRIVE_FAULT),
         ),
-        _family(
-            "over-voltage",
-            _faulty("over_voltage", _between(42.5, 60.0)),
-            *(_R.VOLTAGE_HIGH, _R.DRIVE_FAULT),
-        ),
-        _family(
-            "under-voltage",
-            _faulty("under_voltage", _between(2.0, 17.5)),
-            *(_R.VOLTAGE_LOW, _R.DRIVE_FAULT),
-        ),
-        _family("limit notice", _faulty("limit_notice", _one_of([*range(96, 106)])), _R.FINISHED),
-        _family(
+        Family("over-voltage", _faulty("over_voltage", _HIGH), (_R.VOLTAGE_HIGH, _R.DRIVE_FAULT)),
+        Family("under-voltage", _faulty("under_voltage", _LOW), (_R.VOLTAGE_LOW, _R.DRIVE_FAULT)),
+        Family("limit notice", _faulty("limit_notice", _one_of([*range(96, 106)])), (_R.FINISHED,)),
+        Family(
             "adapter unplugged",
             _faulty("unplug", _unplugged),
-            *(_R.REPLIES_MISSING, _R.DRIVE_TIMEOUT),
+            (_R.REPLIES_MISSING, _R.DRIVE_TIMEOUT),
         ),
-        _family(
-            "drive restarted",
-            _faulty("power_loss", _nothing),
-            *(_R.DRIVE_LEFT_MODE, _R.REPLIES_MISSING),
-        ),
-        _family("fault while arming", _severe("powered", 0.0, 0.3), *_SEVERE_REASONS),
-        _family("fault at lift-off", _severe("flight", 0.0, 0.005), *_SEVERE_REASONS),
-        _family("fault while sinking", _severe("flight", 1.0, 1.6), *_SEVERE_REASONS),
-        _family("double fault", _double, *_SEVERE_REASONS),
-        _family("stalled host", _stall, _R.LOOP_STALLED, _R.DRIVE_TIMEOUT),
-        _family("killed host", _death),
-        ("wrong boot pose", Family("wrong boot pose", _pose, refused=True)),
-        (
-            "wrong wiring",
-            Family(
-                "wrong wiring",
-                _wiring,
-                frozenset({_R.STANDS_WRONG, _R.POSITION_LIMIT, _R.SPEED_LIMIT}),
-                grounded=True,
-            ),
-        ),
-        ("wrong configuration", Family("wrong configuration", _configuration, refused=True)),
-    ]
-)
+        Family("drive restarted", _faulty("power_loss"), (_R.DRIVE_LEFT_MODE, _R.REPLIES_MISSING)),
+        Family("fault while arming", _severe("powered", 0.0, 0.3), _STOPS),
+        Family("fault at lift-off", _severe("flight", 0.0, 0.005), _STOPS),
+        Family("fault while sinking", _severe("flight", 1.0, 1.6), _STOPS),
+        Family("double fault", _double, _STOPS),
+        Family("stalled host", _stall, (_R.LOOP_STALLED, _R.DRIVE_TIMEOUT)),
+        Family("killed host", _death),
+        Family("wrong boot pose", _pose, refused=True),
+        Family("wrong wiring", _wiring, _MISWIRED, grounded=True),
+        Family("wrong configuration", _configuration, refused=True),
+    )
+}
 """Every family, by name."""

@@ -65,6 +65,13 @@ def judge_trace(result: Result, done: Performance, family: Family | None) -> Non
         result.problems.append("the supervisor did not stay stopped")
 
 
+def judge_braking(result: Result, braked: float | None) -> None:
+    """Add how long after the host's death the drives brake, s; None if they do not."""
+    result.braked = braked
+    if braked is None or braked > BRAKED_WITHIN:
+        result.problems.append("the drives did not brake in time after the host's death")
+
+
 def problems_of_box(folder: Path) -> list[str]:
     """Return what is wrong with the flight recording of a killed host."""
     boxes = list(folder.glob(f"*{SUFFIX}"))

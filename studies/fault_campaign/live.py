@@ -22,7 +22,7 @@ from studies.fault_campaign.case import Case, Result, Scene, words
 from studies.fault_campaign.emulator_process import EmulatorProcess
 from studies.fault_campaign.families import Family
 from studies.fault_campaign.judging import (
-    BRAKED_WITHIN,
+    judge_braking,
     judge_trace,
     judge_wire,
     problems_of_box,
@@ -68,7 +68,7 @@ def _hop(scene: Scene, emulator: EmulatorProcess, folder: Path) -> Result:
     result = Result(words(scene.mishap))
     link = MoteusLink(scene.robot, open_transport(str(emulator.path)))
     try:
-        done = scene.perform(link, folder, None, realtime=True)
+        done = scene.perform(link, folder)
     finally:
         link.close()
     record = emulator.record()
@@ -89,7 +89,7 @@ def _killed(scene: Scene, emulator: EmulatorProcess, folder: Path) -> Result:
     if child == 0:
         try:
             link = MoteusLink(scene.robot, open_transport(str(emulator.path)))
-            scene.perform(link, folder, None, realtime=True)
+            scene.perform(link, folder)
             signal.pause()
         finally:
             os._exit(1)
@@ -101,18 +101,16 @@ def _killed(scene: Scene, emulator: EmulatorProcess, folder: Path) -> Result:
     finally:
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
-    if _gave_up(folder):
+    if gave_up(folder):
         result.disturbed = True
         return result
     time.sleep(_AFTERWARDS)
-    result.braked = _braked(emulator.record().log, result.began)
-    if result.braked is None or result.braked > BRAKED_WITHIN:
-        result.problems.append("the drives did not brake in time after the host's death")
+    judge_braking(result, _braked(emulator.record().log, result.began))
     result.problems += problems_of_box(folder)
     return result
 
 
-def _gave_up(folder: Path) -> bool:
+def gave_up(folder: Path) -> bool:
     """Tell whether the host had stopped the leg before it died, as the computer was too slow."""
     slow = {reason.name.lower() for reason in _OF_A_SLOW_COMPUTER}
     try:

@@ -4,7 +4,6 @@ import os
 import signal
 import tempfile
 import threading
-import time
 from pathlib import Path
 
 from hopping_leg.deploy.drive_link import DriveMode
@@ -17,7 +16,7 @@ from hopping_leg.robot.parameters import Robot
 from studies.fault_campaign.case import Case, Result, Scene, words
 from studies.fault_campaign.families import Family
 from studies.fault_campaign.judging import (
-    BRAKED_WITHIN,
+    judge_braking,
     judge_trace,
     judge_wire,
     problems_of_box,
@@ -33,32 +32,17 @@ class HostDiedError(Exception):
 
 
 class StruckClock:
-    """A lockstep clock of a host that is struck at a time after the first lift-off.
-
-    Args:
-        lockstep: That is run.
-        at: When, s after the first lift-off.
-        stall: How long the host stands still, s.
-        dies: Whether it dies: ``HostDiedError`` is raised, and ``braked`` tells the drives' answer.
-        killed_after: Time of the computer after which the process is really killed, s; None lets
-            it live.
+    """A lockstep clock of a host that is struck by its mishap after the first lift-off.
 
     Attributes:
         began: When it was struck, s.
         braked: From the host's death until both drives brake, s; None if a drive does not.
     """
 
-    def __init__(
-        self,
-        lockstep: Lockstep,
-        at: float,
-        *,
-        stall: float = 0.0,
-        dies: bool = False,
-        killed_after: float | None = None,
-    ) -> None:
-        self._lockstep, self._at = lockstep, at
-        self._stall, self._dies, self._killed_after = stall, dies, killed_after
+    def __init__(self, lockstep: Lockstep, scene: Scene, *, killed: bool = False) -> None:
+        """Strike it once; if it is to be killed, the process really is, else it is watched."""
+        self._lockstep, self._mishap = lockstep, scene.mishap
+        self._killed_after = scene.killed_after if killed else None
         self.began: float | None = None
         self.braked: float | None = None
 
@@ -72,16 +56,16 @@ class StruckClock:
         Raises:
             HostDiedError: It died.
         """
-        robot = self._lockstep.robot
-        struck = self._stall or self._dies or self._killed_after is not None
-        if struck and self.began is None and deadline >= robot.fault_injector.flown + self._at:
+        robot, mishap = self._lockstep.robot, self._mishap
+        due = deadline >= robot.fault_injector.flown + mishap.at
+        if (mishap.stall or mishap.dies) and self.began is None and due:
             self.began = robot.time
             if self._killed_after is not None:
-                threading.Thread(target=_kill, args=(self._killed_after,), daemon=True).start()
-            if self._dies:
+                threading.Timer(self._killed_after, os.kill, (os.getpid(), signal.SIGKILL)).start()
+            elif mishap.dies:
                 self.braked = self._watch()
                 raise HostDiedError
-            deadline += self._stall
+            deadline += mishap.stall
         return self._lockstep.wait_until(deadline)
 
     def _watch(self) -> float | None:
@@ -102,11 +86,6 @@ def _braking(drive: EmulatedDrive) -> bool:
     if machine.mode is DriveMode.TIMEOUT:
         return int(settings["servo.timeout_mode"]) == DriveMode.BRAKE
     return machine.mode is DriveMode.BRAKE or machine.mode not in CONTROLLING
-
-
-def _kill(seconds: float) -> None:
-    time.sleep(seconds)
-    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def play(case: Case, family: Family, robot: Robot) -> Result:
@@ -152,10 +131,10 @@ def _hop(scene: Scene) -> Result:
     mishap = scene.mishap
     result = Result(words(mishap))
     lockstep, log = _logged(scene)
-    clock = StruckClock(lockstep, mishap.at, stall=mishap.stall, dies=mishap.dies)
+    clock = StruckClock(lockstep, scene)
     with tempfile.TemporaryDirectory() as folder:
         try:
-            done = scene.perform(lockstep.link, Path(folder), clock, realtime=False, threaded=False)
+            done = scene.perform(lockstep.link, Path(folder), clock)
         except HostDiedError:
             done = None
         finally:
@@ -172,9 +151,7 @@ def _hop(scene: Scene) -> Result:
     if done is not None:
         judge_trace(result, done, scene.family)
         return result
-    result.braked = clock.braked
-    if clock.braked is None or clock.braked > BRAKED_WITHIN:
-        result.problems.append("the drives did not brake in time after the host's death")
+    judge_braking(result, clock.braked)
     return result
 
 
@@ -185,8 +162,9 @@ def _killed(scene: Scene) -> list[str]:
         if child == 0:
             try:
                 lockstep = Lockstep(scene.start.build(), checksums=scene.checksums)
-                clock = StruckClock(lockstep, scene.mishap.at, killed_after=scene.killed_after)
-                scene.perform(lockstep.link, Path(folder), clock, realtime=False)
+                scene.perform(
+                    lockstep.link, Path(folder), StruckClock(lockstep, scene, killed=True)
+                )
                 signal.pause()
             finally:
                 os._exit(1)
