@@ -6,22 +6,21 @@ import json
 import math
 import os
 import platform
+import re
 import tomllib
-import types
 from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, cast, get_args, get_origin, get_type_hints
+
+import msgspec
 
 from hopping_leg.errors import HoppingLegError, TraceError, UsageError, unknown_name
 
 Tree = dict[str, Any]
 """Nested tables as read from TOML or JSON."""
 
-Field = dataclasses.Field[Any]
 Kind = TypeVar("Kind")
-
-_FORMS = {str: "a text in quotes", bool: "true or false", int: "a whole number"}
 
 
 def write_atomically(path: Path, content: bytes) -> None:
@@ -163,98 +162,61 @@ def quantity(unit: str, default: float | None, **valid: bool) -> Any:  # noqa: A
 
 
 def read_dataclass(
-    kind: type[Kind],
-    tree: object,
-    origin: str,
-    *,
-    error: type[HoppingLegError] = UsageError,
-    path: str = "",
-    read_quantity: Callable[[object, Field, str], float] | None = None,
+    kind: type[Kind], tree: object, origin: str, *, error: type[HoppingLegError] = UsageError
 ) -> Kind:
-    """Return the dataclass that a table describes.
+    """Return the dataclass that a table describes, as ``msgspec.convert`` does.
 
-    Its fields may be texts, numbers, truth values, literals, tuples of these, dataclasses, and any
-    of them or None. Numbers must be finite.
+    Beyond that, unknown fields are refused, and numbers that are not finite.
 
     Args:
         kind: The dataclass; a field's ``metadata["choices"]`` are all that it may be.
         tree: The table: field names to values.
         origin: Where it comes from, e.g. the file, for messages.
         error: Raised where something is wrong.
-        path: Path of the table in the file, e.g. ``"hip.motor"``.
-        read_quantity: Reads a number whose field has a ``unit`` in its metadata, given entry (None
-            where it is missing), field and path; without it, such fields are plain numbers.
 
     Raises:
         HoppingLegError: Naming the field and what was valid; ``error`` unless ``kind`` raised it.
     """
-    if not isinstance(tree, dict):
-        raise error(f"{origin}: '{path or origin}' must be a table, not {one_line(tree)}.")
-    specs: dict[str, Field] = {f.name: f for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
-    hints = get_type_hints(kind)
-    for key in tree:
-        if key not in specs:
-            where = f"field in [{path}]" if path else "field"
-            raise error(f"{origin}: {unknown_name(where, str(key), specs)}")
-    values: Tree = {}
-    for name, spec in specs.items():
-        at = f"{path}.{name}" if path else name
-        missing = name not in tree
-        if missing and not spec.default is spec.default_factory is dataclasses.MISSING:
-            continue
-        if read_quantity is not None and "unit" in spec.metadata:
-            values[name] = read_quantity(tree.get(name), spec, at)
-        elif dataclasses.is_dataclass(inner := hints[name]) and not missing:
-            values[name] = read_dataclass(
-                cast("type[Any]", inner),
-                tree[name],
-                origin,
-                error=error,
-                path=at,
-                read_quantity=read_quantity,
-            )
-        else:
-            choices = spec.metadata.get("choices", ())
-            if missing:
-                form = _form(hints[name], choices)
-                form += f" [{at}]" if form == "a table" else ""
-                raise error(f"{origin}: '{at}' is missing; it needs {form}.")
-            values[name] = _read(tree[name], hints[name], choices, f"{origin}: '{at}'", error)
+    _check(kind, tree, "", origin, error)
     try:
-        return kind(**values)
+        return msgspec.convert(tree, kind)
+    except msgspec.ValidationError as problem:
+        what, _, where = str(problem).partition(" - at `")
+        field = re.sub(r"^\$\.?|`$", "", where)
+        raise error(f"{origin}: {f'{field!r}: ' if field else ''}{what}.") from None
     except HoppingLegError as problem:
         raise type(problem)(f"{origin}: {problem}") from None
 
 
-def _read(
-    value: object,
+def _check(
     kind: Any,  # noqa: ANN401
-    choices: tuple[str, ...],
-    subject: str,
+    value: object,
+    path: str,
+    origin: str,
     error: type[HoppingLegError],
-) -> object:
-    """Return a value as its field's type, or say what was valid."""
-    args = get_args(kind)
-    if _is_optional(kind):
-        return None if value is None else _read(value, args[0], choices, subject, error)
-    if get_origin(kind) is Literal or choices:
-        valid = choices or args
-        if not isinstance(value, str | int) or value not in valid:
-            named = value if isinstance(value, str) else one_line(value)
-            raise error(f"{subject}: {unknown_name('value', named, map(str, valid))}")
-        return value
-    if get_origin(kind) is tuple and isinstance(value, list | tuple):
-        kinds = [args[0]] * len(value) if args[-1] is Ellipsis else list(args)
-        if len(kinds) == len(value):
-            pairs = zip(value, kinds, strict=True)
-            return tuple(_read(v, k, (), subject, error) for v, k in pairs)
-    elif kind is float and is_number(value):
-        return float(cast(float, value))
-    elif kind in _FORMS and isinstance(value, kind) and (kind is bool) == isinstance(value, bool):
-        return value
-    if get_origin(kind) is dict and isinstance(value, dict):
-        return value
-    raise error(f"{subject} is {one_line(value)} but must be {_form(kind, choices)}.")
+    choices: tuple[str, ...] = (),
+) -> None:
+    """Refuse unknown fields, values beyond the choices, and numbers that are not finite."""
+    subject = f"{origin}: '{path}'"
+    choices = get_args(kind) if get_origin(kind) is Literal else choices
+    if choices and (not isinstance(value, str | int) or value not in choices):
+        named = value if isinstance(value, str) else one_line(value)
+        raise error(f"{subject}: {unknown_name('value', named, map(str, choices))}")
+    if isinstance(value, list | tuple):
+        for number, entry in enumerate(value):
+            _check(None, entry, f"{path}[{number}]", origin, error)
+    elif isinstance(value, dict) and dataclasses.is_dataclass(kind):
+        specs = {spec.name: spec for spec in dataclasses.fields(kind)}
+        hints = get_type_hints(kind)
+        for key, entry in value.items():
+            if key not in specs:
+                where = f"field in [{path}]" if path else "field"
+                raise error(f"{origin}: {unknown_name(where, str(key), specs)}")
+            at = f"{path}.{key}" if path else key
+            choices = specs[key].metadata.get("choices", ())
+            _check(hints[key], entry, at, origin, error, tuple(choices))
+    elif isinstance(value, int | float) and not isinstance(value, bool) and not is_number(value):
+        raise error(f"{subject} is {one_line(value)} but must be a finite number.")
 
 
 def is_number(value: object) -> bool:
@@ -262,22 +224,3 @@ def is_number(value: object) -> bool:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return math.isfinite(value) if isinstance(value, float) else abs(value) < 10**_MOST_DIGITS
-
-
-def _form(kind: Any, choices: tuple[str, ...]) -> str:  # noqa: ANN401
-    """Return what a field may hold."""
-    args = get_args(kind)
-    if _is_optional(kind):
-        return _form(args[0], choices)
-    if get_origin(kind) is Literal or choices:
-        return f"one of {', '.join(map(str, choices or args))}"
-    if get_origin(kind) is tuple:
-        pair = args == (float, float)
-        return "a pair [hip, knee] of numbers" if pair else f"a list of {len(args)}"
-    if dataclasses.is_dataclass(kind) or get_origin(kind) is dict:
-        return "a table"
-    return _FORMS.get(kind, "a finite number")
-
-
-def _is_optional(kind: Any) -> bool:  # noqa: ANN401
-    return isinstance(kind, types.UnionType) or get_origin(kind) is Union

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -248,7 +249,9 @@ def evaluate(
     firsts = len(FIRST_GAINS)
     runs = len(commands) * firsts
     fields = [field.name for field in dataclasses.fields(ShapingGains)]
-    stacked = {n: np.repeat([getattr(c, n) for c in candidates], runs) for n in fields}
+    stacked: dict[str, Any] = {
+        n: np.repeat([getattr(c, n) for c in candidates], runs) for n in fields
+    }
     stacked["k0"] = stacked["k0"] * np.tile(FIRST_GAINS, len(candidates) * len(commands))
     command = np.tile(np.repeat(commands, firsts), len(candidates))
     controller = EnergyShaping(config.robot, ShapingGains(**stacked), ROBUST, rate=config.rate)

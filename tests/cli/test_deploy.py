@@ -194,7 +194,6 @@ EMULATE, TRANSPORT = ["emulate", "--seconds", "0"], ["doctor", "--transport"]
         ([*EMULATE, "--start-pose", "x"], "There is no pose 'x'"),
         ([*EMULATE, "--faults", "none.toml"], "no fault script none.toml"),
         ([*EMULATE, "--seed", "-1"], "--seed is -1"),
-        ([*EMULATE, "--channel", "x"], "A channel is for CAN buses"),
         ([*TRANSPORT, "/none/port"], "There is no serial port /none/port"),
         ([*TRANSPORT, "usb"], "There is no transport 'usb'"),
         ([*TRANSPORT, "socketcn:can0"], "python-can has no interface 'socketcn'"),

@@ -40,7 +40,7 @@ def test_drives_cannot_be_changed_without_a_transport(refused):
 
 OPTIONAL = [
     *(*TRAINING, "ray"),
-    *("moteus", "can", "serial", "msgpack", "viser", "playwright"),
+    *("moteus", "can", "serial", "viser", "playwright"),
 ]
 HARDWARE = "pip install 'hopping-leg[hardware]'"
 

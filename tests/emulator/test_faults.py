@@ -174,10 +174,10 @@ def test_a_script_is_read(tmp_path):
     ("text", "sentence"),
     [
         ('[[fault]]\nkind = "late"', "There is no value 'late'"),
-        ("[[fault]]\nat = 1.0", "'kind' is missing"),
+        ("[[fault]]\nat = 1.0", "missing required field"),
         ('[[fault]]\nkind = "unplug"\nwhen = 2', "There is no field 'when'"),
         ('[[fault]]\nkind = "unplug"\nat = -1', "must be 0 or more"),
-        ('[[fault]]\nkind = "unplug"\nat = "1"', "must be a finite number"),
+        ('[[fault]]\nkind = "unplug"\nat = "1"', "'at': Expected `float`"),
         ('[[fault]]\nkind = "unplug"\ncount = 0', "must be 1 or more"),
         ('[[fault]]\nkind = "configuration"\nname = "servo.x"', "There is no drive setting"),
         ('[[fault]]\nkind = "unplug"\nphase = "noon"', "There is no fault phase 'noon'"),

@@ -111,7 +111,7 @@ def test_every_mistake_gets_a_sentence_that_names_the_field(tmp_path, path, mist
     ("content", "sentence"),
     [
         ("base = [", "not valid TOML"),
-        ("base = 3", "'name' is missing"),
+        ("base = 3", "'base': Expected"),
         ('extends = "legv2"\nkind = "log"', "Did you mean 'leg'"),
         ('name = " "\nextends = "legv2"', "'name' is empty"),
         ("extends = 3", "'extends' must be"),

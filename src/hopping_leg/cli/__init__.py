@@ -132,7 +132,7 @@ def _refused_variable(error: Exception) -> str | None:
 
 _EXTRAS = {
     **dict.fromkeys(("torch", "stable_baselines3", "onnx", "tensorboard"), "train"),
-    **dict.fromkeys(("moteus", "can", "serial", "msgpack"), "hardware"),
+    **dict.fromkeys(("moteus", "can", "serial"), "hardware"),
     **dict.fromkeys(("mcap", "mcap_ros2"), "ros"),
     "viser": "view",
     "playwright": "dev",

@@ -4,14 +4,13 @@ import dataclasses
 import json
 import logging
 import shlex
-from functools import partial
 from importlib import resources
 from multiprocessing import parent_process
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 from hopping_leg.errors import RobotError, nearest_names, unknown_name
-from hopping_leg.io import Field, Tree, is_number, one_line, parse_toml, read_dataclass
+from hopping_leg.io import Tree, is_number, one_line, parse_toml, read_dataclass
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.robot.robot_checks import (
     check_physics,
@@ -70,8 +69,7 @@ def robot_from_tree(tree: Tree, origin: str) -> Robot:
                 f"{origin}: '{path}' is a mechanical stop, which belongs to the joint; write it as"
                 f" '{new}'."
             )
-    read_quantity = partial(_read_quantity, origin)
-    robot = read_dataclass(Robot, resolved, origin, error=RobotError, read_quantity=read_quantity)
+    robot = read_dataclass(Robot, _with_values(Robot, resolved, origin), origin, error=RobotError)
     if not robot.name.strip():
         raise RobotError(f"{origin}: 'name' is empty; give the robot a name.")
     check_physics(robot, origin)
@@ -201,7 +199,7 @@ def robot_tree(part: Any, source: str) -> Tree:  # noqa: ANN401
     return tables
 
 
-def _default(spec: Field) -> object:
+def _default(spec: dataclasses.Field[Any]) -> object:
     made = spec.default_factory
     return spec.default if made is dataclasses.MISSING else made()
 
@@ -231,7 +229,22 @@ def _text(value: Any) -> str:  # noqa: ANN401
     return repr(value)
 
 
-def _read_quantity(origin: str, entry: object, spec: Field, path: str) -> float:
+def _with_values(kind: Any, tree: object, origin: str, path: str = "") -> object:  # noqa: ANN401
+    """Return a dataclass' tables with the value in place of each entry of value, unit, source."""
+    if not isinstance(tree, dict) or not dataclasses.is_dataclass(kind):
+        return tree
+    plain, hints = dict(tree), get_type_hints(kind)
+    for spec in dataclasses.fields(kind):
+        at = f"{path}{spec.name}"
+        if "unit" not in spec.metadata:
+            if spec.name in tree:
+                plain[spec.name] = _with_values(hints[spec.name], tree[spec.name], origin, f"{at}.")
+        elif spec.name in tree or spec.default is dataclasses.MISSING:
+            plain[spec.name] = _read_quantity(origin, tree.get(spec.name), spec, at)
+    return plain
+
+
+def _read_quantity(origin: str, entry: object, spec: dataclasses.Field[Any], path: str) -> float:
     unit = spec.metadata["unit"]
     if not isinstance(entry, dict) or set(entry) != {"value", "unit", "source"}:
         is_what = "missing" if entry is None else one_line(entry)
