@@ -67,22 +67,21 @@ class _Policy(ActorCriticPolicy):  # type: ignore[misc]
 
 
 class _TrueState(TaskVecEnv):
-    """Shows the actor the true state and the last action, and the critic the same."""
+    """Shows the true state and the last action."""
 
     def __init__(self, task: envs.HoppingTask) -> None:
         super().__init__(task, privileged=True)
-        self.seen = task.privileged_size + 2
-        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (2 * self.seen,), np.float32)
+        size = task.privileged_size + 2
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
 
     def _observation(self, seen: Array32) -> Array32:
-        state = true_state(self.task)
-        return np.concatenate([state, state], axis=1)
+        return true_state(self.task)
 
     def _end_episodes(self, step: Any, done: Any) -> list[dict[str, Any]]:  # noqa: ANN401
         infos = super()._end_episodes(step, done)
         for leg in np.flatnonzero(done):
-            state = np.append(step.final_privileged[leg], np.zeros(2, np.float32))
-            infos[leg]["terminal_observation"] = np.concatenate([state, state])
+            last = np.append(step.final_privileged[leg], np.zeros(2, np.float32))
+            infos[leg]["terminal_observation"] = last
         return infos
 
 
@@ -92,15 +91,18 @@ def true_state(task: envs.HoppingTask) -> Array32:
 
 
 def _ppo(
-    env: TaskVecEnv, actor: int, hidden: list[int], rate: float, log_std: float, seed: int
+    env: TaskVecEnv,
+    rate: float,
+    log_std: float,
+    seed: int,
+    policy: str | type[_Policy],
+    **of: object,
 ) -> PPO:
     return PPO(
-        _Policy, env, learning_rate=lambda left: rate * cosine(left), n_steps=64, batch_size=4096,
+        policy, env, learning_rate=lambda left: rate * cosine(left), n_steps=64, batch_size=4096,
         n_epochs=8, gamma=0.99, gae_lambda=0.97, ent_coef=0.0, vf_coef=1.0, max_grad_norm=1.0,
         use_sde=True, sde_sample_freq=24, seed=seed, device="cpu",
-        policy_kwargs={
-            "actor": actor, "hidden": hidden, "log_std_init": log_std, "activation_fn": nn.Tanh,
-        },
+        policy_kwargs={"log_std_init": log_std, "activation_fn": nn.Tanh, **of},
     )  # fmt: skip
 
 
@@ -143,11 +145,8 @@ class LearntTeacher:
 
     def torque(self, command: Array) -> Array:
         """Return joint torques for the task's commands, N m, (n, 2)."""
-        seen = torch.from_numpy(true_state(self._task))
-        with torch.no_grad():
-            action = self._policy.action_net(self._policy.mlp_extractor.forward_actor(seen))
-        torque: Array = action.clamp(-1, 1).double().numpy() * self._full
-        return torque
+        action, _ = self._policy.predict(true_state(self._task), deterministic=True)
+        return np.asarray(action * self._full)
 
     def state(self) -> dict[str, Array]:
         """Return nothing."""
@@ -162,7 +161,9 @@ def learn_teacher(
 ) -> Callable[[envs.HoppingTask], LearntTeacher]:
     """Train a teacher from scratch; return what makes it for a task."""
     env = _TrueState(_task(recipe, robot, seed))
-    model = _ppo(env, env.seen, [128, 64], 1e-3, _LOG_STD[0], seed)
+    model = _ppo(
+        env, 1e-3, _LOG_STD[0], seed, "MlpPolicy", net_arch={"pi": [128, 64], "vf": [256, 128]}
+    )
     _learn(model, env, steps, _LOG_STD)
     return lambda task: LearntTeacher(model.policy, task)
 
@@ -172,8 +173,8 @@ def refine(dagger: Dagger, recipe: Recipe, robot: Robot, seed: int, steps: int) 
     student = dagger.student
     assert isinstance(student, WindowStudent), "only dense students are refined"
     env = TaskVecEnv(_task(recipe, robot, seed), privileged=True)
-    hidden = list(recipe.value("hidden"))
-    model = _ppo(env, env.task.observation.size, hidden, 1e-4, _LOG_STD[1], seed)
+    parts = {"actor": env.task.observation.size, "hidden": list(recipe.value("hidden"))}
+    model = _ppo(env, 1e-4, _LOG_STD[1], seed, _Policy, **parts)
     layers = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
     for own, given in zip(layers, student.layers, strict=True):
         own.load_state_dict(given.state_dict())
