@@ -133,7 +133,7 @@ def _refused_variable(error: Exception) -> str | None:
 _EXTRAS = {
     **dict.fromkeys(("torch", "stable_baselines3", "onnx", "tensorboard"), "train"),
     **dict.fromkeys(("moteus", "can", "serial"), "hardware"),
-    **dict.fromkeys(("mcap", "mcap_ros2"), "ros"),
+    **dict.fromkeys(("mcap", "mcap_ros2", "rosbags"), "ros"),
     "viser": "view",
     "playwright": "dev",
 }

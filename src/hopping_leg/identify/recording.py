@@ -155,7 +155,7 @@ def _read(path: Path, origin: str) -> tuple[pl.DataFrame, dict[str, Any], str]:
     content = b"".join(contents)
     digest = hashlib.sha256(content).hexdigest()
     if files:
-        return *bag_reader.read_bag(files, origin), digest
+        return *bag_reader.read_bag(path, origin), digest
     if not content:
         raise RecordingError(f"{path} is empty; record again.")
     if content.startswith(_PARQUET):
