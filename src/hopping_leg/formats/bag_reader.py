@@ -6,6 +6,7 @@ message that was logged by then. Columns are called after topic, joint and quant
 """
 
 from pathlib import Path
+from typing import Any
 
 import polars as pl
 
@@ -70,10 +71,8 @@ def _messages(path: Path) -> tuple[Rows, Rows]:
     with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
         wanted = [c for c in bag.connections if c.msgtype in (JOINT_STATE, FLOAT)]
         for connection, time, raw in bag.messages(wanted) if wanted else ():
-            name, message = (
-                connection.topic.strip("/"),
-                bag.deserialize(raw, connection.msgtype),
-            )
+            name = connection.topic.strip("/")
+            message: Any = bag.deserialize(raw, connection.msgtype)
             if connection.msgtype == FLOAT:
                 numbers.setdefault(name, []).append({_LOGGED: time, name: message.data})
                 continue
