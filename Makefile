@@ -45,6 +45,7 @@ lint: $(STAMP)
 types: $(STAMP)
 	$(BIN)/mypy
 docs: $(STAMP)
+	$(BIN)/python docs/render.py --check
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 wheel: $(STAMP)
 	$(BIN)/pytest -q tests/test_package.py

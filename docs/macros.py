@@ -10,6 +10,7 @@ or a figure of the study. mkdocs puts this folder on the path while it loads thi
 import contextlib
 import io
 import os
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -53,17 +54,20 @@ MACROS = {
 
 
 def on_files(files: Files, config: Any) -> Files:  # noqa: ANN401
-    """Put results of the studies, notebooks and the live page beside the pages (for mkdocs)."""
-    for path in sorted([*ROOT.glob("studies/*/results/*"), *ROOT.glob("studies/*/figures/*")]):
-        address = f"results/{path.parts[-3]}/{path.name}"
-        files.append(File.generated(config, address, abs_src_path=str(path)))
+    """Put studies with their results, notebooks and the live page beside the pages (for mkdocs)."""
+    for kind in ("README.md", "results/*", "figures/*"):
+        for path in sorted(ROOT.glob(f"studies/*/{kind}")):
+            address = path.relative_to(ROOT).as_posix()
+            files.append(File.generated(config, address, abs_src_path=str(path)))
     for address, content in (macros_live.pages() | macros_notebooks.pages()).items():
         files.append(File.generated(config, address, content=content))
     return files
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:  # noqa: ANN401
-    """Fill one page (called by mkdocs)."""
+    """Let links lead to where the site has what the repository has elsewhere (for mkdocs)."""
+    if page.file.src_uri.startswith("studies/"):
+        return markdown.replace("](../../docs/", "](../../")
     environment = jinja2.Environment(
         undefined=jinja2.StrictUndefined, autoescape=False, keep_trailing_newline=True
     )
@@ -71,4 +75,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:  # noqa: ANN401
         text = environment.from_string(markdown).render(MACROS)
     except (jinja2.TemplateError, OSError, LookupError, TypeError, ValueError) as error:
         raise PluginError(f"docs/{page.file.src_uri}: {type(error).__name__}: {error}") from error
-    return text.replace("](results/", "](" + "../" * page.file.src_uri.count("/") + "results/")
+    up = "../" * page.file.src_uri.count("/")
+    text = re.sub(r"\]\(results/(\w+)/([\w.-]+json)\)", rf"]({up}studies/\1/results/\2)", text)
+    text = re.sub(r"\]\(results/(\w+)/([\w.-]+)\)", rf"]({up}studies/\1/figures/\2)", text)
+    return re.sub(r"\]\((\.\./)+studies/", f"]({up}studies/", text)

@@ -3,7 +3,6 @@
 A result is named ``STUDY/FILE``, e.g. ``speed/env.json``.
 """
 
-import contextlib
 import dataclasses
 import importlib
 import json
@@ -94,9 +93,8 @@ def safety_case() -> str:
 
 
 def not_certified() -> str:
-    """Return the list of what the safety case does not show."""
-    case = importlib.import_module("studies.fault_campaign.safety_case")
-    return "\n".join(f"- {entry};" for entry in case.NOT_CERTIFIED).rstrip(";") + "."
+    """Return where the list of what the safety case does not show stands."""
+    return tables("fault_campaign")
 
 
 def value(file: str, path: str, factor: float | None = None, digits: int | None = None) -> str:
@@ -177,22 +175,13 @@ def latest(file: str, path: str, by: str, *columns: str) -> str:
 
 
 def tables(study: str) -> str:
-    """Return the tables of a study's README, of the results that are stored in today's form."""
-    parts = []
-    for macro, file, *words in importlib.import_module(f"studies.{study}").TABLES:
-        where = words.pop() if isinstance(words[-1], dict) else {}
-        if stored(f"{study}/{file}"):
-            with contextlib.suppress(LookupError, TypeError):
-                parts.append(MACROS[macro](f"{study}/{file}", *words, **where))
-    return "\n".join(parts) or not_stored(study)
+    """Return where the tables of a study stand."""
+    return f"The tables stand in `studies/{study}/README.md`.\n"
 
 
 def zero_shot(kind: str) -> str:
-    """Return the shares of controllers on legs that they never met, ``twins`` or ``legs``."""
-    file = f"sim_to_real/zero_shot_{kind}.json"
-    if not stored(file):
-        return not_stored("sim_to_real")
-    return table(file, "summary", *importlib.import_module("studies.sim_to_real").ZERO_SHOT)
+    """Return where the shares of controllers on legs that they never met stand."""
+    return tables("sim_to_real")
 
 
 def limits(study: str) -> str:

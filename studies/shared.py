@@ -1,7 +1,7 @@
 """What studies share: options, errors in a sentence, the results that they store, timing.
 
 A study's ``RESULTS`` are the shell commands behind ``studies/NAME/results`` and ``figures``;
-``python -m studies.NAME --results`` runs them and fills the tables of its README.
+``python -m studies.NAME --results`` runs them and renders the pages that show them.
 Timings alternate what is compared and take medians, so that other load cannot bias them.
 """
 
@@ -28,7 +28,6 @@ from hopping_leg.errors import UsageError
 from hopping_leg.io import versions, write_atomically, write_json
 from hopping_leg.sim import compile_physics
 from hopping_leg.workers import ProcessWorkers
-from studies import readmes
 
 Row = dict[str, Any]
 """JSON values by name: a result, or a record of it."""
@@ -103,7 +102,7 @@ def run_results(name: str) -> int:
             raise UsageError(f"`{command}` failed with exit code {done.returncode}; see above.")
         if file := stored_file(command):
             store(ROOT / file, command)
-    readmes.write(name)
+    subprocess.run([sys.executable, ROOT / "docs/render.py"], check=True)
     return 0
 
 

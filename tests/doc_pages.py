@@ -13,7 +13,10 @@ PAGES = {
 }
 
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-_NO_PROSE = re.compile(r"^```.*?^```$|\{\{.*?\}\}|\{%.*?%\}|<!--.*?-->", re.DOTALL | re.MULTILINE)
+_NO_PROSE = re.compile(
+    r"<!-- render.*?<!-- /render -->|^```.*?^```$|\{\{.*?\}\}|\{%.*?%\}", re.DOTALL | re.MULTILINE
+)
+_EXAMPLE = "<!-- render: example("
 _INLINE = re.compile(r"(?<!`)`(hop [^`]+)`(?!`)")
 _INDENTED = re.compile(r"^ {4,}(hop|python|make|pip) .*$", re.MULTILINE)
 
@@ -27,10 +30,8 @@ class Block:
     where: str
     """Page and line, for messages."""
 
-    @property
-    def is_example(self) -> bool:
-        """Whether it shows a file of examples/, which has a test of its own."""
-        return bool(re.fullmatch(r"\{\{ *example\(.*\) *\}\}\s*", self.text))
+    is_example: bool
+    """Whether it shows a file of examples/, which has a test of its own."""
 
     def commands(self) -> list[list[str]]:
         """Return its commands, split into words as a shell does, without comments."""
@@ -42,7 +43,12 @@ def blocks(page: str) -> list[Block]:
     """Return a page's fenced blocks in order."""
     text, name = PAGES[page].read_text(encoding="utf-8"), PAGES[page].name
     return [
-        Block(found[1], found[2], f"{name}:{text.count(chr(10), 0, found.start()) + 1}")
+        Block(
+            found[1],
+            found[2],
+            f"{name}:{text.count(chr(10), 0, found.start()) + 1}",
+            _EXAMPLE in text[: found.start()].splitlines()[-2:][0],
+        )
         for found in _BLOCK.finditer(text)
     ]
 

@@ -21,9 +21,9 @@ CEILINGS = {
     "src/hopping_leg/sim/**/*.py": (13, 2520),
     "src/hopping_leg/viewer/**/*.py": (9, 1510),
     "src/**/*.py": (207, 32710),
-    "tests/**/*.py": (151, 17560),
-    "studies/**/*.py": (84, 9400),
-    "docs/**/*.md": (38, 3320),
+    "tests/**/*.py": (151, 17530),
+    "studies/**/*.py": (84, 9040),
+    "docs/**/*.md": (36, 3300),
     "docs/live/*.js": (13, 1490),
 }
 """Files and lines at most. Who raises one says what users gain by it."""

@@ -6,16 +6,3 @@ RESULTS = (
     "--generations 80 --population 20 --step 0.08 --commands 0.22 0.25 0.29 0.33 0.36 "
     "--out runs/flying --json studies/energy_shaping/results/flying.json",
 )
-
-TABLES = (
-    (
-        "table",
-        "energy_shaping.json",
-        "cases",
-        "case",
-        "mean_abs_median_error_m*1000=error, mm",
-        "mean_std_m*1000=std, mm",
-        "hop_rate_hz=hops/s",
-        "skipped_hops=skipped hops",
-    ),
-)

@@ -6,17 +6,6 @@ from studies.fault_campaign.families import FAMILIES, Family
 
 _CONFIDENCE = 0.95
 
-NOT_CERTIFIED = (
-    "drives, adapter and leg are emulated; no trial was made on hardware",
-    "failures of the drives' own firmware, whose watchdog and brake are the last resort",
-    "a computer that sends wrong torques without being late, e.g. by broken memory",
-    "people: nothing sees them; keep a hand on the switch",
-    "mechanical failures: a loose screw, a torn belt, a broken link",
-    "a hip's gear that is off by a factor of two or less, a mirrored leg and a belt that skips,"
-    " see the supervisor's page",
-)
-"""What the trials do not show."""
-
 
 def upper_bound(trials: int, failures: int) -> float | None:
     """Return the 95 % upper bound of a failure rate without failures; None with any, or no trial.

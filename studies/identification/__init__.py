@@ -16,18 +16,3 @@ RESULTS = (
     "python -m studies.identification --parts recordings --json "
     "studies/identification/results/recordings.json",
 )
-
-TABLES = (
-    ("table", "known_legs.json", "bars", "what", "bar", "measured", "unit", "reached"),
-    ("table", "coverage.json", "bars", "what", "bar", "measured", "unit", "reached"),
-    (
-        "table",
-        "coverage.json",
-        "coverage.rows",
-        "parameter",
-        "share_inside=intervals that hold the truth",
-        "rms_error_over_half_width=error over half width, rms",
-    ),
-    ("table", "paper_size.json", "bars", "what", "bar", "measured", "unit", "reached"),
-    ("table", "recordings.json", "bars", "what", "bar", "measured", "unit", "reached"),
-)

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from hopping_leg.cli import VERBS
-from studies import readmes
 from studies.shared import LONGEST, ROOT, condensed, results, store, stored_file
 
 NAMES = sorted(path.parent.name for path in ROOT.glob("studies/*/__main__.py"))
@@ -52,12 +51,6 @@ def test_what_a_command_reads_an_earlier_one_has_made(name):
             if path.startswith("runs/") and Path(path).suffix and path not in written:
                 assert any(path == file or path.startswith(f"{file}/") for file in made), path
         made += written
-
-
-@pytest.mark.parametrize("name", [readmes.PROJECT, *NAMES])
-def test_numbers_of_a_readme_are_those_of_its_stored_results(name):
-    pytest.importorskip("mkdocs", reason="the extra 'docs' is not installed")
-    assert readmes.filled(name) == readmes.readme(name).read_text()
 
 
 def test_results_are_small():

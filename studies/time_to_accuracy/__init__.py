@@ -14,23 +14,3 @@ RESULTS = (
     f"python -m studies.time_to_accuracy --recipes universal --seeds 0 1 2 --json "
     f"{_RESULTS}/universal.json",
 )
-
-TABLES = tuple(
-    table
-    for name in ("distillation", "reinforcement_learning", "universal")
-    for table in (
-        (
-            "table",
-            f"{name}.json",
-            "summary",
-            "recipe",
-            "seconds=seconds",
-            "runs",
-            "worst_seed_mean_error_m*1000=error of the worst seed, mm",
-            "mean_error_m*1000=error, mm",
-            "mean_std_m*1000=std, mm",
-            "skipped_hops=skipped hops",
-        ),
-        ("table", f"{name}.json", "spent", "recipe", "part", "seconds"),
-    )
-)
