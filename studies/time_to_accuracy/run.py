@@ -10,15 +10,13 @@ were trained for.
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from rich.table import Table
 
+from hopping_leg.cli.options import JsonFile, mm, show_table
 from hopping_leg.colours import controller_colours
 from hopping_leg.controllers.policy import Policy
-from hopping_leg.evaluate.result import ResultCache
 from hopping_leg.evaluate.runner import software_versions
 from hopping_leg.figure_style import panels, plain_log, styled, to_svg
 from hopping_leg.io import write_atomically
@@ -27,7 +25,7 @@ from hopping_leg.rl.recipes import RECIPES
 from hopping_leg.rl.run_folder import read_result
 from hopping_leg.rl.train import train
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
-from hopping_leg.terminal import plain_console
+from studies.shared import Row, once
 from studies.time_to_accuracy import sb3
 
 JUDGING_SEEDS = (1000, 1001)
@@ -37,8 +35,6 @@ SHARES = {"fast": (0.25, 0.5, 1.0), "precise": (0.25, 1.0)}
 """Shares of the recipe's steps of the trainings of a distillation."""
 
 _SPACING = 0.02
-
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -57,34 +53,30 @@ class TimeToAccuracy:
     """Where the trainings are kept: finished ones are not repeated, killed ones go on."""
     figure: Path | None = None
     """Draw the curves to this .svg file."""
-    json: Path | None = None
-    """Write every number to this file."""
+    json: JsonFile = None
 
-    def measure(self) -> dict[str, Any]:
+    def measure(self) -> Row:
         """Run it, print a table, return every number."""
-        console = plain_console()
-        cache = ResultCache(self.out / "judged", console.print)
         rows: list[Row] = []
         spent: list[Row] = []
         for recipe in self.recipes:
+            asked = {"robot": self._robot(recipe).digest, "minutes": self.minutes}
+            asked |= {"options": repr(RECIPES.get(recipe)), "shares": SHARES.get(recipe)}
             for seed in self.seeds:
-                asked = {"robot": self._robot(recipe).digest, "minutes": self.minutes}
-                asked |= {"options": repr(RECIPES.get(recipe)), "shares": SHARES.get(recipe)}
-                found = cache.load_or_run(
-                    f"{recipe}-{seed}",
-                    f"{recipe}, seed {seed}",
-                    asked,
-                    lambda recipe=recipe, seed=seed: self._train(recipe, seed),  # type: ignore[misc]
-                )
+                file = self.out / "judged" / f"{recipe}-{seed}.json"
+                found = once(file, asked, self._train, recipe, seed)
                 rows += [{"recipe": recipe, "seed": seed, **row} for row in found["rows"]]
                 spent += [{"recipe": recipe, "seed": seed, **found["spent"]}]
         summary = summarise(rows)
-        table = Table("recipe", "seconds", "error, mm", "worst seed", "std, mm", "skipped")
-        for row in summary:
-            keys = ("mean_error_m", "worst_seed_mean_error_m", "mean_std_m")
-            cells = [_mm(row[key]) for key in keys]
-            table.add_row(row["recipe"], f"{row['seconds']:.0f}", *cells, str(row["skipped_hops"]))
-        console.print(table)
+        lengths = ("mean_error_m", "worst_seed_mean_error_m", "mean_std_m")
+        show_table(
+            ("recipe", "seconds", "error, mm", "worst seed", "std, mm", "skipped"),
+            (
+                (row["recipe"], f"{row['seconds']:.0f}", *(mm(row[key]) for key in lengths),
+                 row["skipped_hops"])
+                for row in summary
+            ),
+        )  # fmt: skip
         if self.figure is not None:
             write_atomically(self.figure, to_svg(draw(rows)))
         return {
@@ -96,7 +88,7 @@ class TimeToAccuracy:
             "versions": software_versions(),
         }
 
-    def _train(self, recipe: str, seed: int) -> dict[str, Any]:
+    def _train(self, recipe: str, seed: int) -> Row:
         """Train and judge; return rows over time, and what the last training spent time on."""
         robot = self._robot(recipe)
         if recipe in sb3.ALGORITHMS:
@@ -159,24 +151,19 @@ def summarise(rows: list[Row]) -> list[Row]:
         for _, group in groupby(rows, key=lambda row: (row["recipe"], row["seed"]))
         for point, row in enumerate(group)
     ]
-    names = list(dict.fromkeys(row["recipe"] for row in rows))
     found = []
-    for name in names:
-        own = [row for row in numbered if row["recipe"] == name]
-        for point in sorted({row["point"] for row in own}):
-            there = [row for row in own if row["point"] == point]
-            errors = [row["mean_abs_median_error_m"] for row in there]
-            found.append(
-                {
-                    "recipe": name,
-                    "seconds": float(np.mean([row["seconds"] for row in there])),
-                    "runs": len(there),
-                    "mean_error_m": float(np.mean(errors)),
-                    "worst_seed_mean_error_m": float(np.max(errors)),
-                    "mean_std_m": float(np.mean([row["mean_std_m"] for row in there])),
-                    "skipped_hops": sum(row["skipped_hops"] for row in there),
-                }
-            )
+    for name, point in dict.fromkeys((row["recipe"], row["point"]) for row in numbered):
+        there = [row for row in numbered if (row["recipe"], row["point"]) == (name, point)]
+        errors = [row["mean_abs_median_error_m"] for row in there]
+        found.append({
+            "recipe": name,
+            "seconds": float(np.mean([row["seconds"] for row in there])),
+            "runs": len(there),
+            "mean_error_m": float(np.mean(errors)),
+            "worst_seed_mean_error_m": float(np.max(errors)),
+            "mean_std_m": float(np.mean([row["mean_std_m"] for row in there])),
+            "skipped_hops": sum(row["skipped_hops"] for row in there),
+        })  # fmt: skip
     return found
 
 
@@ -211,7 +198,3 @@ def draw(rows: list[Row]) -> Figure:
     axes[0][0].legend(ncol=len(colours))
     axes[-1][0].set_xlabel("wall-clock time / s")
     return figure
-
-
-def _mm(metres: float) -> str:
-    return f"{1e3 * metres:.1f}"
