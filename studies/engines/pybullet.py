@@ -64,19 +64,15 @@ class PyBulletWorld:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "leg.urdf"
             path.write_text(urdf, encoding="utf-8")
+            flags = self._bullet.URDF_USE_INERTIA_FROM_FILE
             leg: int = self._bullet.loadURDF(
-                str(path),
-                useFixedBase=True,
-                flags=self._bullet.URDF_USE_INERTIA_FROM_FILE,
-                **self._world,
+                str(path), useFixedBase=True, flags=flags, **self._world
             )
         return leg
 
     def _find_joints(self) -> dict[str, int]:
-        count = self._bullet.getNumJoints(self._leg, **self._world)
-        infos = [
-            self._bullet.getJointInfo(self._leg, joint, **self._world) for joint in range(count)
-        ]
+        joints = range(self._bullet.getNumJoints(self._leg, **self._world))
+        infos = (self._bullet.getJointInfo(self._leg, joint, **self._world) for joint in joints)
         return {info[1].decode(): info[0] for info in infos}
 
     def _make_free(self, robot: Robot) -> None:

@@ -6,25 +6,23 @@ again.
 
 import itertools
 from collections.abc import Callable
-from concurrent.futures import as_completed
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
-from hopping_leg.cli.options import Heights, at_least, mm, show_table
+from hopping_leg.cli.options import Heights, JsonFile, at_least, mm, show_table
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller, robot_of
 from hopping_leg.evaluate.trials import choose_commands, floor_robot
 from hopping_leg.hop_detection import trace_hops
 from hopping_leg.io import versions
-from hopping_leg.progress import ShareProgress
-from hopping_leg.robot import TIMESTEP, Robot, load_robot
+from hopping_leg.robot import TIMESTEP, load_robot
 from hopping_leg.sim import Simulator
 from hopping_leg.sim.mujoco_simulator import MujocoSimulator
 from hopping_leg.workers import ProcessWorkers
 from studies.engines.pybullet import PyBulletSimulator
+from studies.shared import Row
 
 Engine = Literal["MuJoCo", "PyBullet"]
 
@@ -52,20 +50,16 @@ class Engines:
     """Physics step, s."""
     workers: int = 2
     """Processes that share the work; the numbers do not depend on it."""
-    json: Path | None = None
-    """Write every number to this file."""
+    json: JsonFile = None
 
-    def measure(self) -> dict[str, Any]:
+    def measure(self) -> Row:
         """Let all controllers hop in both engines, print a table, return every number."""
         at_least(1, seeds=self.seeds, workers=self.workers)
         at_least(0, seed=self.seed)
-        places = list(itertools.product(ENGINES, self.controllers))
-        with ProcessWorkers(self.workers) as pool, ShareProgress() as progress:
-            parts = [pool.submit(hop, self, *place) for place in places]
-            for done, part in enumerate(as_completed(parts), 1):
-                part.result()
-                progress.show("hopping", done / len(parts))
-        rows = [row for part in parts for row in part.result()]
+        places = itertools.product(ENGINES, self.controllers)
+        with ProcessWorkers(self.workers) as pool:
+            parts = pool.map(hop, [(self, *place) for place in places])
+        rows = [row for part in parts for row in part]
         show_table(
             ("engine", "controller", "command, m", "median error, mm", "std, mm", "hops"),
             (
@@ -83,26 +77,23 @@ class Engines:
         }
 
 
-def hop(study: Engines, engine: Engine, name: str) -> list[dict[str, Any]]:
+def hop(study: Engines, engine: Engine, name: str) -> list[Row]:
     """Return how a controller hops in an engine on the robot of its training: a row per command.
 
     Errors are median apex minus command; a leg that does not hop has none.
     """
-    robot: Robot = floor_robot(load_robot(robot_of([name])), "stiff")
+    told = load_robot(robot_of([name]))
+    robot = floor_robot(told, "stiff")
     config = RolloutConfig(robot, timestep=study.timestep)
     commands = choose_commands(robot, study.commands)
     asked = np.repeat(commands, study.seeds)
     schedule = np.tile(asked, (round(_SECONDS * config.rate), 1))
     legs = ENGINES[engine](robot, len(asked), rate=config.rate, timestep=study.timestep)
-    run = rollout(
-        load_controller(name, load_robot(robot_of([name])), other="accept"),
-        config, schedule, study.seed, legs=legs,
-    )  # fmt: skip
+    controller = load_controller(name, told, other="accept")
+    run = rollout(controller, config, schedule, study.seed, legs=legs)
     start = round(_SETTLE * config.rate)
-    apexes = []
-    for leg in range(len(asked)):
-        trace = run.trace(leg)
-        apexes.append(trace_hops(replace(trace, table=trace.table[start:])).apex)
+    traces = (run.trace(leg) for leg in range(len(asked)))
+    apexes = [trace_hops(replace(t, table=t.table[start:])).apex for t in traces]
     rows = []
     for index, command in enumerate(commands):
         found = np.concatenate(apexes[index * study.seeds : (index + 1) * study.seeds])

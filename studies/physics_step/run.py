@@ -5,18 +5,14 @@ is compared are medians and standard deviations of many hops under the same nois
 """
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
-from rich.progress import Progress
-from rich.table import Table
+from rich.progress import track
 
-from hopping_leg.arrays import Array
-from hopping_leg.cli.options import at_least
+from hopping_leg.cli.options import JsonFile, at_least, mm, say, show_table
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller
@@ -24,7 +20,7 @@ from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim import Simulator
 from hopping_leg.sim.mujoco_simulator import MujocoSimulator
-from hopping_leg.terminal import plain_console
+from studies.shared import Row
 
 TOLERANCE = 0.5e-3
 """By how much halving the step may move a median or a standard deviation, m."""
@@ -93,79 +89,77 @@ class PhysicsStep:
     """Of noise and delay, the same at every step."""
     threads: int = 0
     """Threads of the physics, 0 for all cores; results do not depend on it."""
-    json: Path | None = None
-    """Write every number to this file."""
+    json: JsonFile = None
 
-    def measure(self) -> dict[str, Any]:
+    def measure(self) -> Row:
         """Run it, print a table, return every number."""
         at_least(1, halvings=self.halvings, repeats=self.repeats)
         pairs = [(n, load_robot(r)) for n in self.controllers for r in self.robots]
         pairs = [(name, robot) for name, robot in pairs if _fits(name, robot)]
         steps = [self.coarsest / 2**k for k in range(self.halvings + 1)]
-        jobs = [(name, robot, step) for name, robot in pairs for step in steps]
-        rows: list[dict[str, Any]] = []
-        with Progress(transient=True) as bar:
-            # A run at a step costs about its number of steps.
-            task = bar.add_task("hopping", total=sum(1 / step for _, _, step in jobs))
-            for name, robot, step in jobs:
-                rows += self._rows(name, robot, step)
-                bar.advance(task, 1 / step)
-            variants = list(self._variants()) if self.variants else []
+        rows: list[Row] = []
+        converge: list[Row] = []
+        for name, robot in track(pairs, "hopping", transient=True):
+            own = [row for step in steps for row in self._rows(name, robot, step)]
+            about = {"controller": name, "robot": robot.name}
+            converge.append({**about, "timestep_s": converged(own)})
+            rows += own
+        show_table(
+            ("controller", "robot", "step, ms", "command, m", "error, mm", "std", "hops"),
+            (
+                (r["controller"], r["robot"], f"{r['timestep_s'] * 1e3:.3f}",
+                 f"{r['command_m']:.2f}", mm(r["median_error_m"]), mm(r["std_m"]), r["hops"])
+                for r in rows
+            ),
+        )  # fmt: skip
         result = {
             "tolerance_m": TOLERANCE,
             "converged_timestep_s": converged(rows),
-            "converged": [
-                {
-                    "controller": name,
-                    "robot": robot.name,
-                    "timestep_s": converged(rows, name, robot),
-                }
-                for name, robot in pairs
-            ],
+            "converged": converge,
             "rows": rows,
-            "variants": variants,
+            "variants": self._variants() if self.variants else [],
             "repeats": self.repeats,
             "duration_s": self.duration,
         }
-        _print(result)
+        say(*(f"{r['controller']} on {r['robot']}: {_says(r['timestep_s'])}." for r in converge))
+        say(f"All of them: {_says(converged(rows))}.")
         return result
 
     def _rows(
         self, name: str, robot: Robot, step: float, legs: Simulator | None = None
-    ) -> list[dict[str, Any]]:
+    ) -> list[Row]:
         setup = RolloutConfig(robot, timestep=step, threads=self.threads)
         commands = np.repeat(self.commands, self.repeats)
         ticks = round(self.duration * setup.rate)
         controller = load_controller(name, robot)
         run = rollout(controller, setup, np.tile(commands, (ticks, 1)), self.seed, legs=legs)
-        columns = (run.data[c] for c in ("height_m", "height_rate_m_s", "foot_clearance_m"))
-        apexes = [_apexes(run.time, *leg) for leg in zip(*(c.T for c in columns), strict=True)]
+        columns = (run.data[c].T for c in ("height_m", "height_rate_m_s", "foot_clearance_m"))
+        apexes = []
+        for leg in zip(*columns, strict=True):
+            hops = find_hops(*leg)
+            apexes.append(hops.apex[run.time[hops.tick] >= SETTLING])
         rows = []
         for number, command in enumerate(self.commands):
             mine = apexes[number * self.repeats : (number + 1) * self.repeats]
             errors = np.concatenate(mine) - command
-            medians, stds = (
-                np.array([of(apex) for apex in mine if len(apex)]) for of in (np.median, np.std)
-            )
-            root = max(len(medians), 1) ** 0.5
-            rows.append(
-                {
-                    "controller": name,
-                    "robot": robot.name,
-                    "timestep_s": step,
-                    "command_m": command,
-                    "median_error_m": float(np.median(errors)) if len(errors) else None,
-                    "std_m": float(errors.std()) if len(errors) else None,
-                    "median_error_m_standard_error": float(medians.std() / root),
-                    "std_m_standard_error": float(stds.std() / root),
-                    "hops": len(errors),
-                }
-            )
+            some = [apex for apex in mine if len(apex)]
+            row: Row = {
+                "controller": name,
+                "robot": robot.name,
+                "timestep_s": step,
+                "command_m": command,
+                "hops": len(errors),
+            }
+            for key, of in (("median_error_m", np.median), ("std_m", np.std)):
+                row[key] = float(of(errors)) if some else None
+                spread = np.std([of(apex) for apex in some]) / len(some) ** 0.5 if some else 0.0
+                row[f"{key}_standard_error"] = float(spread)
+            rows.append(row)
         return rows
 
-    def _variants(self) -> Iterator[dict[str, Any]]:
-        robot = load_robot(self.robots[0])
-        base: list[dict[str, Any]] = []
+    def _variants(self) -> list[Row]:
+        robot, found = load_robot(self.robots[0]), []
+        base: list[Row] = []
         for name, edit in VARIANTS.items():
             legs = MujocoSimulator(
                 robot, len(self.commands) * self.repeats, timestep=2.5e-4,
@@ -173,12 +167,13 @@ class PhysicsStep:
             )  # fmt: skip
             rows = self._rows("energy-shaping", robot, 2.5e-4, legs)
             base = base or rows
-            yield {
+            found.append({
                 "variant": name,
                 "robot": robot.name,
                 "largest_median_shift_m": _largest(base, rows, "median_error_m"),
                 "largest_std_change_m": _largest(base, rows, "std_m"),
-            }
+            })  # fmt: skip
+        return found
 
 
 def _fits(name: str, robot: Robot) -> bool:
@@ -186,29 +181,17 @@ def _fits(name: str, robot: Robot) -> bool:
     return not isinstance(controller, Policy) or controller.card.robot == robot.name
 
 
-def _apexes(time: Array, height: Array, rate: Array, clearance: Array) -> Array:
-    hops = find_hops(height, rate, clearance)
-    return hops.apex[time[hops.tick] >= SETTLING]
-
-
-def converged(
-    rows: list[dict[str, Any]], controller: str | None = None, robot: Robot | None = None
-) -> float | None:
+def converged(rows: list[Row]) -> float | None:
     """Return the coarsest step from which on halving changes no statistic.
 
     A median or standard deviation changes by more than ``TOLERANCE`` and two standard errors of
     the difference, runs being independent. The finest step has nothing to be compared with; None
     if even the one before it moves.
     """
-    chosen = [
-        row
-        for row in rows
-        if controller in (None, row["controller"]) and (robot is None or robot.name == row["robot"])
-    ]
-    steps = sorted({row["timestep_s"] for row in chosen})
+    steps = sorted({row["timestep_s"] for row in rows})
     best = None
     for fine, coarse in itertools.pairwise(steps):
-        one, other = ([r for r in chosen if r["timestep_s"] == s] for s in (coarse, fine))
+        one, other = ([r for r in rows if r["timestep_s"] == s] for s in (coarse, fine))
         if any(
             _moves(a, b, name)
             for a, b in zip(one, other, strict=True)
@@ -219,38 +202,19 @@ def converged(
     return best
 
 
-def _moves(one: dict[str, Any], other: dict[str, Any], name: str) -> bool:
+def _moves(one: Row, other: Row, name: str) -> bool:
     if one[name] is None or other[name] is None:
         return True
     error = np.hypot(one[f"{name}_standard_error"], other[f"{name}_standard_error"])
     return bool(abs(one[name] - other[name]) > max(TOLERANCE, 2 * error))
 
 
-def _largest(one: list[dict[str, Any]], other: list[dict[str, Any]], name: str) -> float | None:
+def _largest(one: list[Row], other: list[Row], name: str) -> float | None:
     """Return the largest change of a statistic, None where one of them has no hops."""
     pairs = [(a[name], b[name]) for a, b in zip(one, other, strict=True)]
     if any(value is None for pair in pairs for value in pair):
         return None
     return max((abs(float(a - b)) for a, b in pairs), default=None)
-
-
-def _print(result: dict[str, Any]) -> None:
-    table = Table("controller", "robot", "step, ms", "command, m", "error, mm", "std", "hops")
-    for row in result["rows"]:
-        lengths = (row["median_error_m"], row["std_m"])
-        table.add_row(
-            row["controller"],
-            row["robot"],
-            f"{row['timestep_s'] * 1e3:.3f}",
-            f"{row['command_m']:.2f}",
-            *("-" if value is None else f"{value * 1e3:.1f}" for value in lengths),
-            str(row["hops"]),
-        )
-    console = plain_console()
-    console.print(table)
-    for row in result["converged"]:
-        console.print(f"{row['controller']} on {row['robot']}: {_says(row['timestep_s'])}.")
-    console.print(f"All of them: {_says(result['converged_timestep_s'])}.")
 
 
 def _says(step: float | None) -> str:
