@@ -13,7 +13,7 @@ from studies.fault_campaign.families import FAMILIES
 
 from hopping_leg.cli.robots import derived
 from hopping_leg.emulator.faults import KINDS
-from hopping_leg.evaluate.robustness.axes import AXES
+from hopping_leg.evaluate.robustness_axes import AXES
 from hopping_leg.robot import load_robot, load_tree, numbers
 from hopping_leg.sim.randomization import TWIN_RANGES
 from hopping_leg.trace import COLUMNS

@@ -30,6 +30,11 @@ def sine_trace(seconds=10.0, hops_per_second=2.0, apex=0.31, switch=None):
     return Trace(pl.DataFrame(columns))
 
 
+def window_of(trace):
+    (window,) = measure(trace)
+    return window
+
+
 def with_column(trace, name, values):
     return Trace(trace.table.with_columns(pl.Series(name, values)), trace.header)
 

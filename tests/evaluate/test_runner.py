@@ -12,7 +12,7 @@ from hopping_leg.errors import PolicyError, UsageError
 from hopping_leg.evaluate import Entry, entries, evaluate
 from hopping_leg.evaluate.entries import load_entries
 from hopping_leg.evaluate.result import ResultCache
-from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
+from hopping_leg.evaluate.robustness import make_suite, run_suite
 from hopping_leg.evaluate.runner import _note_stopped
 from hopping_leg.evaluate.trials import (
     COMMANDS,

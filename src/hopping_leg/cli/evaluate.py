@@ -157,7 +157,7 @@ def _judge_robustness(args: Evaluate, command: str) -> None:
     from hopping_leg import figure_style
     from hopping_leg.evaluate import figures, tables
     from hopping_leg.evaluate.result import ResultCache
-    from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
+    from hopping_leg.evaluate.robustness import make_suite, run_suite
 
     entries, setup = args.load()
     out, heights, seeds = args.out or Path("runs/robustness"), args.commands, args.seeds

@@ -11,7 +11,6 @@ from rich.console import Console
 from rich.table import Table
 
 from hopping_leg.evaluate.result import Comparison, Estimator, Evaluation, Group, Staircase, Summary
-from hopping_leg.evaluate.robustness.outcome import OVERALL
 from hopping_leg.html_page import Column, table
 from hopping_leg.terminal import print_table
 
@@ -256,6 +255,7 @@ def print_robustness(console: Console, result: dict[str, Any]) -> None:
     c = result["conditions"]
     marked = {axis["name"]: bool(axis["leaderboard"]) for axis in result["axes"]}
     scores = {(row["controller"], row["axis"]): _score(row) for row in result["scores"]}
+    axes = list(dict.fromkeys(axis for _, axis in scores))
 
     def score(controller: str) -> Column:
         return Column(controller, lambda axis: scores[controller, axis])
@@ -267,7 +267,7 @@ def print_robustness(console: Console, result: dict[str, Any]) -> None:
         f"{', '.join(f'{command:g}' for command in c['commands_m'])} m, {c['seeds']} seeds from"
         f" {c['seed']}; in brackets the 95 % interval;\nR: on RealAIGym's leaderboard, too"
     )
-    print_table(_text_table(columns, [*marked, OVERALL], title, caption), console)
+    print_table(_text_table(columns, axes, title, caption), console)
 
 
 def _score(row: dict[str, Any]) -> str:

@@ -5,7 +5,7 @@ down at least one, where the foot's clearance and the trained heights allow it; 
 measured on a leg.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
 
@@ -58,7 +58,8 @@ class Axis:
     levels: tuple[float, ...]
     moderate: tuple[float, float]
     """Range in which the axis ``joint`` draws it."""
-    alter: Alter
+    alter: Alter | None
+    """None for ``JOINT``, whose levels lie on the way to points that are drawn."""
     leaderboard: str = ""
     """Name on RealAIGym's robustness leaderboard, if it is there."""
 
@@ -164,28 +165,21 @@ AXES = (
 )  # fmt: skip
 """Every axis that is changed on its own."""
 
-JOINT = "joint"
-"""The axis that changes all others at once."""
+NOMINAL = Axis("nominal", "nothing is changed", "1", 0.0, (0.0,), (0.0, 0.0), lambda case, _: case)
+"""Stated beside the axes, part of no score."""
 
-JOINT_LEVELS = (0.25, 0.5, 0.75, 1.0)
-"""Shares of the moderate ranges."""
-
-NOMINAL = "nominal"
-"""Nothing is changed; stated beside the axes, part of no score."""
+JOINT = Axis("joint", "all axes at once, this share of the way to points of their moderate ranges",
+             "1", 0.0, (0.25, 0.5, 0.75, 1.0), (0.0, 1.0), None)  # fmt: skip
 
 
-def axis_names() -> list[str]:
-    """Return the names of all axes, ``joint`` last."""
-    return [*(axis.name for axis in AXES), JOINT]
-
-
-def axis_named(name: str) -> Axis:
-    """Return the axis of a name.
+def axes_named(names: Sequence[str]) -> tuple[Axis, ...]:
+    """Return the axes of some names in their own order, ``JOINT`` last; without names, all.
 
     Raises:
-        UsageError: There is none.
+        UsageError: There is no axis of a name.
     """
-    for axis in AXES:
-        if axis.name == name:
-            return axis
-    raise errors.UsageError(errors.unknown_name("axis", name, axis_names()))
+    every = {axis.name: axis for axis in (*AXES, JOINT)}
+    for name in names:
+        if name not in every:
+            raise errors.UsageError(errors.unknown_name("axis", name, every))
+    return tuple(axis for name, axis in every.items() if name in names or not names)

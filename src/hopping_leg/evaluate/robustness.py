@@ -1,0 +1,333 @@
+"""The robustness benchmark: every controller on every axis, in worlds that it was not told of.
+
+All trials of an axis are fixed by the seed before any controller has moved, and run as one batch.
+"""
+
+import functools
+import itertools
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import polars as pl
+from scipy.stats import qmc
+
+from hopping_leg.arrays import Array
+from hopping_leg.controllers import Controller, RolloutConfig, rollout
+from hopping_leg.evaluate import metrics, runner, statistics, trials
+from hopping_leg.evaluate.entries import Entry, check_labels, check_range, fingerprint
+from hopping_leg.evaluate.result import ResultCache
+from hopping_leg.evaluate.robustness_axes import AXES, NOMINAL, Axis, Case, axes_named
+from hopping_leg.io import safe_file_name
+from hopping_leg.sim.perturbation import Perturbation
+
+SCHEMA = 2
+"""Version of the JSON, raised when a name changes its meaning."""
+
+TOLERANCE = 0.02
+"""Largest magnitude of the median apex minus the command in a successful trial, m."""
+
+OVERALL = "overall"
+"""Row of the mean over all axes."""
+
+JOINT_POINTS = 4
+"""Points of the hypercube per command and seed."""
+
+PUSH_SECONDS = 0.02
+"""Duration of each push, s."""
+
+GROUND_SECONDS, SWITCH_SECONDS = 1.0, 2.5
+"""Time between two steps of the ground, and of the command, s."""
+
+
+@dataclass(frozen=True)
+class Suite:
+    """What is run."""
+
+    setup: RolloutConfig
+    """What controllers believe, with the paper's noise and delay."""
+    axes: tuple[Axis, ...]
+    commands: tuple[float, ...]
+    """Desired apex heights, m."""
+    repeats: int
+    """Realisations of noise, delay and perturbation per level and command."""
+    seed: int
+    """All randomness follows from it."""
+    seconds: float
+    """Duration of each trial, s."""
+
+    @property
+    def conditions(self) -> dict[str, Any]:
+        """What all results depend on, as JSON values."""
+        return {
+            **runner.setup_conditions(self.setup),
+            "commands_m": self.commands,
+            "seeds": self.repeats,
+            "seed": self.seed,
+            "seconds": self.seconds,
+            "joint_points": JOINT_POINTS,
+            "tolerance_m": TOLERANCE,
+        }
+
+
+def make_suite(
+    setup: RolloutConfig,
+    *,
+    axes: Sequence[str] = (),
+    commands: Sequence[float] | None = None,
+    repeats: int = 5,
+    seed: int = 1000,
+    seconds: float = 10.0,
+) -> Suite:
+    """Return a suite that can be run; without axes, on all.
+
+    Commands are the paper's by default, scaled to the leg.
+
+    Raises:
+        UsageError: There is no such axis, or a command is out of reach.
+    """
+    trials.check_repeats(repeats)
+    chosen = trials.choose_commands(setup.robot, commands)
+    return Suite(setup, axes_named(axes), chosen, repeats, seed, seconds)
+
+
+def run_suite(
+    entries: Sequence[Entry],
+    suite: Suite,
+    cache: ResultCache,
+    on_progress: Callable[[str, float], None] = lambda label, share: None,
+) -> dict[str, Any]:
+    """Let every controller meet every axis; the cache keeps the trials of each pair.
+
+    Returns:
+        ``scores``, ``levels``, ``axes``, ``conditions``, ``versions`` and
+        ``notes``, as JSON values.
+
+    Raises:
+        UsageError: A command is out of an entry's range, or a name is taken twice.
+    """
+    check_labels(entries)
+    for entry in entries:
+        check_range(entry, suite.commands)
+    versions, parts = runner.software_versions(), (NOMINAL, *suite.axes)
+    asked = {
+        **suite.conditions,
+        "schema": SCHEMA,
+        "versions": versions,
+        "worlds": [(axis.name, axis.levels, axis.moderate) for axis in AXES],
+    }
+    scores: list[dict[str, Any]] = []
+    levels: list[dict[str, Any]] = []
+    for entry in entries:
+        met: dict[str, pl.DataFrame] = {}
+        for number, axis in enumerate(parts):
+
+            def tick(done: int, ticks: int, label: str = entry.label, number: int = number) -> None:
+                on_progress(label, (number + done / ticks) / len(parts))
+
+            kept = cache.load_or_run(
+                f"{safe_file_name(entry.label)}-{axis.name}",
+                f"{entry.label}: {axis.name}",
+                {**asked, "controller": fingerprint(entry.controller)},
+                functools.partial(_meet, entry.controller, suite, axis, tick),
+            )
+            met[axis.name] = pl.DataFrame(kept["outcomes"])
+            on_progress(entry.label, (number + 1) / len(parts))
+        levels += [
+            row for name, found in met.items() for row in level_rows(entry.label, name, found)
+        ]
+        del met[NOMINAL.name]
+        scores += score_rows(entry.label, met, suite.seed)
+    return {
+        "schema": SCHEMA,
+        "scores": scores,
+        "levels": levels,
+        "axes": [{k: v for k, v in vars(axis).items() if k != "alter"} for axis in suite.axes],
+        "conditions": suite.conditions,
+        "versions": versions,
+        "notes": [note for entry in entries for note in entry.notes],
+    }
+
+
+def _meet(
+    controller: Controller, suite: Suite, axis: Axis, on_tick: Callable[[int, int], None]
+) -> dict[str, Any]:
+    return {"outcomes": run_axis(controller, suite.setup, make_trials(axis, suite), on_tick)}
+
+
+@dataclass(frozen=True)
+class RobustnessTrial:
+    """One leg of an axis' batch."""
+
+    level: float
+    """Level of the axis."""
+    command: float
+    """Desired apex height, m."""
+    repeat: int
+    """Number of the realisation, from 0."""
+    point: int
+    """Number of the hypercube's point, 0 elsewhere."""
+    case: Case
+    """What is simulated."""
+
+
+@dataclass(frozen=True)
+class AxisTrials:
+    """All trials of an axis, run as one batch."""
+
+    trials: tuple[RobustnessTrial, ...]
+    """n of them."""
+    commands: Array
+    """Desired heights, m, (ticks, n)."""
+    perturbation: Perturbation
+    """What changes and pushes the legs."""
+    seed: int
+    """Seed of noise and delay."""
+
+
+def make_trials(axis: Axis, suite: Suite) -> AxisTrials:
+    """Lay down all trials of an axis: every realisation of each of its levels and commands."""
+    entropy, plain = [suite.seed, zlib.crc32(axis.name.encode())], Case(suite.setup.robot)
+    points = 1 if axis.alter else JOINT_POINTS
+    each = list(itertools.product(suite.commands, range(suite.repeats), range(points)))
+    if axis.alter:
+        changes = [axis.alter] * len(each)
+    else:  # the hypercube is drawn once; a level is a share of the way from neutral to its points
+        cube = qmc.LatinHypercube(len(AXES), rng=np.random.default_rng(entropy))
+        changes = [functools.partial(_change_all, row) for row in cube.random(len(each))]
+    legs = tuple(
+        RobustnessTrial(level, *one, change(plain, level))
+        for level in axis.levels
+        for one, change in zip(each, changes, strict=True)
+    )
+    command, torque, force, ground = (
+        np.stack(events, axis=1)
+        for events in zip(*(_events(leg, suite) for leg in legs), strict=True)
+    )
+    return AxisTrials(
+        legs,
+        command,
+        Perturbation(tuple(leg.case.robot for leg in legs), torque, force, ground),
+        int(np.random.SeedSequence(entropy).generate_state(1)[0]),
+    )
+
+
+def _change_all(point: Array, case: Case, share: float) -> Case:
+    """Change every axis by a share of the way to its place, 0 to 1, in its moderate range."""
+    for axis, place in zip(AXES, point, strict=True):
+        assert axis.alter
+        low, high = axis.moderate
+        value = low + place * (high - low)
+        case = axis.alter(case, float(axis.neutral + share * (value - axis.neutral)))
+    return case
+
+
+def _events(trial: RobustnessTrial, suite: Suite) -> tuple[Array, Array, Array, Array]:
+    """Return command, torques, force on the base and ground of a trial over time.
+
+    Draws depend on seed, command, repeat and point alone, so that levels differ in size only.
+    """
+    rng = np.random.default_rng([suite.seed, trial.repeat, trial.point, round(1e4 * trial.command)])
+    case, rate = trial.case, suite.setup.rate
+    time = np.arange(round(suite.seconds * rate)) / rate
+    torque = case.torque_noise * rng.standard_normal((len(time), 2))
+    force = case.push / PUSH_SECONDS * _pushes(rng, len(time), rate)
+    at = np.floor(time / GROUND_SECONDS).astype(int)
+    ground = case.ground * rng.choice((-1, 1)) * np.array([0, 1, 0, -1])[at % 4]
+    return _stepped(trial, suite.commands, time), torque, force, ground
+
+
+def _pushes(rng: np.random.Generator, ticks: int, rate: float) -> Array:
+    """Return when is pushed, with the sign, (ticks,): once in each second but the first."""
+    pushes = np.zeros(ticks)
+    length = max(1, round(PUSH_SECONDS * rate))
+    for second in range(1, round(ticks / rate)):
+        start = round((second + rng.uniform(0, 1 - PUSH_SECONDS)) * rate)
+        pushes[start : start + length] = rng.choice((-1.0, 1.0))
+    return pushes
+
+
+def _stepped(trial: RobustnessTrial, commands: Sequence[float], time: Array) -> Array:
+    """Return the command over time, m: away by a step and back, within the suite's heights."""
+    low, high = min(commands), max(commands)
+    share = (trial.command - low) / (high - low) if high > low else 0.5
+    bottom = trial.command - share * trial.case.command_step
+    pair = (bottom, bottom + trial.case.command_step)
+    first, second = pair if share <= 0.5 else pair[::-1]
+    return np.where(np.floor(time / SWITCH_SECONDS) % 2 == 0, first, second)
+
+
+def run_axis(
+    controller: Controller,
+    setup: RolloutConfig,
+    plan: AxisTrials,
+    on_tick: Callable[[int, int], None] | None = None,
+) -> list[dict[str, Any]]:
+    """Let a controller that knows ``setup`` alone meet all trials of an axis; return a row each."""
+    run = rollout(
+        controller, setup, plan.commands, plan.seed, on_tick, perturbation=plan.perturbation
+    )
+    return [
+        outcome(trial, metrics.measure(run.trace(leg))) for leg, trial in enumerate(plan.trials)
+    ]
+
+
+def outcome(trial: RobustnessTrial, windows: Sequence[metrics.HopWindow]) -> dict[str, Any]:
+    """Return how a trial went, given its stretches of constant command.
+
+    Its error is the median apex minus command; where the command steps, of the height that is
+    missed most. A height without a hop is missed by standing height minus command. A trial is a
+    success where no hop was skipped and the error is within ``TOLERANCE``.
+    """
+    groups = [[w for w in windows if w.command == c] for c in {w.command for w in windows}]
+    errors = [float(np.median(np.concatenate(metrics.errors_of(group)))) for group in groups]
+    error, skipped = max(errors, key=abs), sum(w.skipped for w in windows)
+    missed = any(not len(metrics.pooled_apexes(group)) for group in groups)
+    return {
+        "level": trial.level,
+        "command_m": trial.command,
+        "repeat": trial.repeat,
+        "error_m": error,
+        "missed": missed,
+        "skipped": skipped,
+        "contacts": sum(w.body_contacts for w in windows),
+        "success": skipped == 0 and not missed and abs(error) <= TOLERANCE,
+    }
+
+
+def level_rows(controller: str, axis: str, outcomes: pl.DataFrame) -> list[dict[str, Any]]:
+    """Return the results of each level of an axis, by rising level."""
+    levels = outcomes.group_by("level").agg(
+        pl.col("success").mean(),
+        median_abs_error_m=pl.col("error_m").abs().median(),
+        missed=pl.col("missed").sum(),
+        skipped_hops=pl.col("skipped").sum(),
+        body_contacts=pl.col("contacts").sum(),
+        trials=pl.len(),
+    )
+    return [
+        {"controller": controller, "axis": axis, **row} for row in levels.sort("level").to_dicts()
+    ]
+
+
+def score_rows(
+    controller: str, outcomes: dict[str, pl.DataFrame], seed: int
+) -> list[dict[str, Any]]:
+    """Return a controller's score on every axis, given its trials by axis, and overall.
+
+    A score is the mean over axes of the mean over levels of the share of successes. Its 95 %
+    interval is over realisations: all levels, commands and axes share their draws.
+    """
+    every = pl.concat([found.with_columns(axis=pl.lit(name)) for name, found in outcomes.items()])
+    success, rows = pl.col("success").mean(), []
+    for name in (*outcomes, OVERALL):
+        trials = every if name == OVERALL else every.filter(axis=name)
+        levels = trials.group_by("repeat", "axis", "level").agg(success)
+        axes = levels.group_by("repeat", "axis").agg(success)
+        scores = axes.group_by("repeat").agg(success).sort("repeat")["success"].to_numpy()
+        low, high = statistics.share_interval(scores, seed)
+        row = {"controller": controller, "axis": name, "score": float(scores.mean())}
+        rows.append({**row, "low": low, "high": high, "trials": len(trials)})
+    return rows

@@ -1,0 +1,219 @@
+"""What is met depends on the seed alone, grows with the level and is nothing at the neutral one."""
+
+import dataclasses
+import json
+
+import numpy as np
+import polars as pl
+import pytest
+
+from hopping_leg.controllers import rollout
+from hopping_leg.controllers.registry import load_controller
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate import Entry
+from hopping_leg.evaluate.entries import fingerprint
+from hopping_leg.evaluate.figures import draw_robustness
+from hopping_leg.evaluate.result import ResultCache
+from hopping_leg.evaluate.robustness import (
+    PUSH_SECONDS,
+    level_rows,
+    make_suite,
+    make_trials,
+    outcome,
+    run_axis,
+    run_suite,
+    score_rows,
+)
+from hopping_leg.evaluate.robustness_axes import AXES, JOINT, Case, axes_named
+from hopping_leg.figure_style import to_svg
+from hopping_leg.sim import LegSimulator
+from tests.evaluate.test_metrics import sine_trace, window_of
+
+COMMANDS = (0.25, 0.35)
+
+
+@pytest.fixture
+def plan(setup):
+    def make(name, levels=None, commands=COMMANDS, repeats=2, **options):
+        (axis,) = axes_named([name])
+        suite = make_suite(setup, commands=commands, repeats=repeats, **options)
+        return make_trials(dataclasses.replace(axis, levels=levels or axis.levels), suite)
+
+    return make
+
+
+def arrays(made):
+    found = made.perturbation
+    return (made.commands, found.torque, found.force, found.ground)
+
+
+@pytest.mark.parametrize("axis", AXES, ids=lambda axis: axis.name)
+def test_a_neutral_level_is_the_plain_rollout_bit_for_bit(setup, plan, spring, axis):
+    made = plan(axis.name, [axis.neutral], seconds=2.6)
+    found = rollout(spring, setup, made.commands, made.seed, perturbation=made.perturbation)
+    asked = np.tile(np.repeat(COMMANDS, 2), (len(found.time), 1))
+    plain = rollout(spring, setup, asked, made.seed)
+    for name, values in plain.data.items():
+        np.testing.assert_array_equal(found.data[name], values)
+
+
+@pytest.mark.parametrize("axis", AXES, ids=lambda axis: axis.name)
+def test_levels_and_moderate_ranges_lie_around_the_neutral_level(robot, axis):
+    low, high = axis.moderate
+    assert low <= axis.neutral <= high
+    assert axis.neutral not in axis.levels
+    assert min(axis.levels) <= low or low == axis.neutral
+    assert max(axis.levels) >= high or high == axis.neutral
+    altered = [axis.alter(Case(robot), level) for level in axis.levels]
+    assert len(set(map(repr, altered))) == len(axis.levels)
+    for case in altered:
+        assert case.robot.thigh.length == robot.thigh.length
+    assert LegSimulator(robot, len(altered), robots=[case.robot for case in altered]).count
+
+
+@pytest.mark.parametrize("axis", ["pushes", "torque-noise", JOINT.name])
+def test_the_seed_fixes_what_happens(plan, axis):
+    first, again, other = (plan(axis, seed=seed) for seed in (1000, 1000, 1001))
+    assert first.seed == again.seed != other.seed
+    for one, same in zip(arrays(first), arrays(again), strict=True):
+        np.testing.assert_array_equal(one, same)
+    assert [t.case for t in first.trials] == [t.case for t in again.trials]
+    assert any((a != b).any() for a, b in zip(arrays(first), arrays(other), strict=True))
+
+
+def test_levels_differ_in_size_only(plan):
+    force = plan("pushes", [0.1, 0.3]).perturbation.force
+    small, large = force[:, :4], force[:, 4:]
+    np.testing.assert_allclose(large, 3 * small)
+    assert (np.count_nonzero(small, axis=0) == 9 * round(PUSH_SECONDS * 200)).all()
+    assert np.abs(small).sum(axis=0) / 200 == pytest.approx(np.full(4, 0.9))
+
+
+def test_commands_step_away_and_back_within_the_suites_heights(plan):
+    made = plan("command-steps", [0.04], (0.25, 0.3, 0.35), 1)
+    pairs = [sorted(set(made.commands[:, leg].round(6))) for leg in range(3)]
+    assert pairs == [[0.25, 0.29], [0.28, 0.32], [0.31, 0.35]]
+    assert (np.abs(np.diff(made.commands, axis=0)) > 0).sum() == 3 * 3
+
+
+def test_the_hypercube_stays_within_its_share_of_the_moderate_ranges(plan, robot):
+    made = plan(JOINT.name)
+    for trial in made.trials:
+        share = trial.level
+        added = (trial.case.robot.base.mass - robot.base.mass) / robot.mass
+        assert -0.15 * share <= added <= 0.2 * share
+        assert 0 < trial.case.robot.reality.latency.command <= 0.005 * share
+    points = {t.case.push / t.level for t in made.trials}
+    assert len({round(p, 9) for p in points}) == len(made.trials) / 4
+
+
+def test_controllers_meet_the_same_and_leave_it_as_it_was(setup, plan, spring):
+    made = plan("pushes", [0.5], seconds=3.0)
+    before = [array.copy() for array in arrays(made)]
+    first = run_axis(spring, setup, made)
+    for one, same in zip(arrays(made), before, strict=True):
+        np.testing.assert_array_equal(one, same)
+    assert run_axis(spring, setup, made) == first
+    assert run_axis(spring, setup, dataclasses.replace(made, seed=made.seed + 1)) != first
+
+
+def test_a_suite_repeats_keeps_its_results_and_names_its_rows(setup, spring, tmp_path):
+    names = ("links", "pushes")
+    tiny = make_suite(setup, axes=names, commands=[0.28, 0.32], repeats=1, seconds=2.5)
+    begun, progress = [], []
+    judged, cache = [Entry("my spring", spring)], ResultCache(tmp_path, begun.append)
+    first = run_suite(judged, tiny, cache, lambda _, share: progress.append(share))
+    assert begun == [f"my spring: {axis}" for axis in ("nominal", *names)]
+    assert progress == sorted(progress)
+    assert progress[-1] == 1
+    assert json.dumps(first, allow_nan=False) == json.dumps(run_suite(judged, tiny, cache))
+    assert len(begun) == 3
+    run_suite(judged, dataclasses.replace(tiny, seed=7, axes=axes_named(["pushes"])), cache)
+    assert len(begun) == 5
+    assert to_svg(draw_robustness(first)) == to_svg(draw_robustness(first))
+    assert [row["axis"] for row in first["scores"]] == [*names, "overall"]
+    assert [axis["name"] for axis in first["axes"]] == [*names]
+    assert {row["axis"] for row in first["levels"]} == {"nominal", *names}
+    with pytest.raises(UsageError, match=r"no axis 'wind'.*pushes"):
+        make_suite(setup, axes=["wind"])
+
+
+def test_controllers_are_told_apart_by_what_they_do(robot, spring):
+    names = ("energy-shaping", "energy-shaping-literal", "fast", "paper", "precise")
+    prints = [fingerprint(load_controller(name, robot)) for name in names]
+    prints.append(fingerprint(spring))
+    assert len(set(prints)) == len(prints)
+    assert fingerprint(load_controller("energy-shaping", robot)) == prints[0]
+
+
+def test_success_needs_every_hop_and_the_right_height(plan):
+    trial = plan("delay").trials[0]
+
+    def of(**changes):
+        return outcome(trial, [dataclasses.replace(window_of(sine_trace(apex=0.319)), **changes)])
+
+    assert of()["success"]
+    assert not of(command=0.298)["success"]
+    assert not of(skipped=1)["success"]
+    still = of(apex=np.empty(0), command=0.22)
+    assert still["error_m"] == pytest.approx(0.219 - 0.22)
+    assert still["missed"]
+    assert not still["success"], "standing at the right height is no hop"
+
+
+def rows(level, *successes, repeats=None, **more):
+    """Trials of a level, a realisation each unless ``repeats`` says which."""
+    repeats = repeats or range(len(successes))
+    default = {"error_m": 0.0, "missed": False, "skipped": 0, "contacts": 0}
+    return pl.DataFrame(
+        [
+            {"level": level, "repeat": repeat, "success": success, **default, **more}
+            for repeat, success in zip(repeats, successes, strict=True)
+        ]
+    )
+
+
+def score(outcomes, seed=0):
+    found = score_rows("mine", outcomes, seed)[-1]
+    return found["score"], found["low"], found["high"]
+
+
+def test_the_score_counts_every_axis_and_level_alike():
+    many = rows(0.1, *[True] * 30, repeats=[0] * 30)
+    few = pl.concat([many, rows(0.2, False, False, repeats=[0, 0])])
+    assert score({"delay": few})[0] == pytest.approx(0.5)
+    more = pl.concat([few, rows(0.3, False)])
+    assert score({"delay": more, "links": many})[0] == pytest.approx((1 / 3 + 1) / 2)
+
+
+def test_the_interval_is_over_realisations_not_over_trials():
+    wins = (True, False, True)
+    few = score({"delay": rows(0.1, *wins)}, 1)
+    assert few[0] == pytest.approx(2 / 3)
+    more = score({"delay": pl.concat([rows(0.1, *wins)] * 10)}, 1)
+    assert more == few, "more trials of a realisation tell no more"
+    assert few[2] - few[1] > 0.5
+    many = score({"delay": rows(0.1, *wins * 20)}, 1)
+    assert many[2] - many[1] < 0.3
+    _, low, high = score({"delay": rows(0.1, *[True] * 3)})
+    assert low < 0.75 < high == 1, "three that agree are no certainty"
+    steady = pl.concat([rows(0.1, *[True] * 20), rows(0.2, *[False] * 20)])
+    middle, low, high = score({"delay": steady})
+    assert middle == 0.5, "levels are chosen, not drawn: their difference is no scatter"
+    assert high - low < 0.2
+
+
+def test_rows_tell_levels_axes_and_the_mean():
+    good = pl.concat([rows(0.1, True), rows(0.1, True, error_m=0.01)])
+    bad = [rows(0.2, False, error_m=-0.05, contacts=3), rows(0.2, False, error_m=-0.09, skipped=4)]
+    levels = level_rows("mine", "delay", pl.concat([*bad, good]))
+    assert [row["level"] for row in levels] == [0.1, 0.2]
+    assert [row["success"] for row in levels] == [1.0, 0.0]
+    assert levels[1]["median_abs_error_m"] == pytest.approx(0.07)
+    assert (levels[1]["skipped_hops"], levels[1]["body_contacts"]) == (4, 3)
+    scores = score_rows("mine", {"delay": pl.concat([good, *bad]), "links": good}, 0)
+    assert [(row["axis"], row["score"], row["trials"]) for row in scores] == [
+        ("delay", 0.5, 4),
+        ("links", 1.0, 2),
+        ("overall", 0.75, 6),
+    ]
