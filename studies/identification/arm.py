@@ -8,13 +8,12 @@ motors' torque-speed lines do.
 
 import math
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
 
 import numba
 import numpy as np
 import polars as pl
+from rich.progress import track
 
 from hopping_leg.arrays import Array
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
@@ -22,7 +21,7 @@ from hopping_leg.identify.recording import Recording, make_recording
 from hopping_leg.identify.recording_format import RecordingMetadata
 from hopping_leg.robot import MotorLimit, Robot, load_robot
 from studies.identification.twin import BELIEVED
-from studies.shared import host
+from studies.shared import Row, host
 
 RATE = 200.0
 STIFFNESS, DAMPING = (20.0, 12.0), (0.3, 0.15)
@@ -33,14 +32,8 @@ _DRAWS = 2000
 _TONES = np.array([0.2, 0.35, 0.55, 0.8, 1.1, 1.5, 2.0, 2.7])
 
 
-@dataclass(frozen=True)
-class Noise:
-    """Standard deviations of what is recorded."""
-
-    position: float = 3e-4
-    """rad"""
-    torque: float = 0.02
-    """N m"""
+_POSITION_NOISE, _TORQUE_NOISE = 3e-4, 0.02
+"""Standard deviations of what is recorded, rad and N m."""
 
 
 def draw_truth(robot: Robot, rng: np.random.Generator) -> dict[str, float]:
@@ -60,27 +53,19 @@ def draw_truth(robot: Robot, rng: np.random.Generator) -> dict[str, float]:
 
 
 def record_arm(
-    robot: Robot,
-    truth: dict[str, float],
-    target: float | Array,
-    seed: int | Sequence[int],
-    noise: Noise | None = None,
+    robot: Robot, truth: dict[str, float], seconds: float, seed: int | Sequence[int]
 ) -> Recording:
-    """Record an arm that tracks targets under a PD.
+    """Record an arm that tracks multisines under a PD.
 
     Args:
         robot: Has what ``truth`` leaves out.
         truth: See ``draw_truth``.
-        target: Joint angles, rad, (rows, 2); a number is so many seconds of multisines.
-        seed: Of the multisines' phases and of the noise.
-        noise: Of the sensors.
+        seconds: How long.
+        seed: Of the multisines' phases and of the sensors' noise.
     """
-    noise = noise or Noise()
     rng = np.random.default_rng(seed)
-    if isinstance(target, float):
-        target = _multisine(np.arange(round(target * RATE)) / RATE, rng)
-    rows = len(target)
-    time = np.arange(rows) / RATE
+    time = np.arange(round(seconds * RATE)) / RATE
+    target, rows = _multisine(time, rng), len(time)
     p = np.array(
         [
             robot.thigh.length, robot.thigh.mass, truth["thigh.com"], truth["thigh.inertia"],
@@ -93,8 +78,8 @@ def record_arm(
     limit = MotorLimit(robot)
     line = np.stack([limit.limit, limit.peak, limit.peak / robot.of_joints("no_load_speed")])
     seen = _track(p, line, target, np.array(STIFFNESS), np.array(DAMPING))
-    position = seen[:, :2] + rng.normal(scale=noise.position, size=(rows, 2))
-    torque = seen[:, 4:] + rng.normal(scale=noise.torque, size=(rows, 2))
+    position = seen[:, :2] + rng.normal(scale=_POSITION_NOISE, size=(rows, 2))
+    torque = seen[:, 4:] + rng.normal(scale=_TORQUE_NOISE, size=(rows, 2))
     columns = {"time_s": time}
     for suffix, values in (
         ("position_rad", position), ("torque_nm", torque), ("position_command_rad", target),
@@ -173,9 +158,7 @@ def _distances(draws: Array, true: Array) -> Array:
     return np.asarray(np.einsum("ni,ij,nj->n", off, inverse, off))
 
 
-def coverage(
-    arms: int, seconds: float, seed: int, threads: int, on_arm: Callable[[int, int], None]
-) -> dict[str, Any]:
+def coverage(arms: int, seconds: float, seed: int, threads: int) -> Row:
     """Identify arms that differ, each from a recording of its own, with the default plan.
 
     Args:
@@ -183,7 +166,6 @@ def coverage(
         seconds: Of each recording.
         seed: Of the first arm.
         threads: Of each fit.
-        on_arm: Called with arms done and in all.
 
     Returns:
         Shares of 95 % intervals that hold the truth, in all and by parameter, likewise of those of
@@ -194,7 +176,7 @@ def coverage(
     inside: dict[str, list[bool]] = {}
     errors: dict[str, list[float]] = {}
     taken, drawn_inside, beside = [], [], []
-    for arm in range(arms):
+    for arm in track(range(arms), "arms", transient=True):
         truth = draw_truth(robot, np.random.default_rng([seed, arm]))
         recording = record_arm(robot, truth, seconds, seed + arm)
         begin = time.perf_counter()
@@ -211,7 +193,6 @@ def coverage(
             error = float(value - truth.get(name, 1.0))
             inside.setdefault(name, []).append(abs(error) <= half)
             errors.setdefault(name, []).append(error / half)
-        on_arm(arm + 1, arms)
     return {
         "rows": [
             {

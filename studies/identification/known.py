@@ -1,19 +1,18 @@
 """Known twins identified: with a fixed base, on the ground, hopping, and as long as the paper's."""
 
-import functools
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
-from hopping_leg.identify.optimizers import CmaOptions, Report, SearchOptions
+from hopping_leg.identify.optimizers import CmaOptions, SearchOptions
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.validation import validate
 from hopping_leg.robot.model import COARSE_TIMESTEP
-from studies.identification.study import Clock, FitCache, Study
+from studies.identification.study import Study, timed
 from studies.identification.twin import AIR, GROUND, Motion, believed, record, record_paper
+from studies.shared import Row
 
 METHODS = {
     "least-squares": "least squares",
@@ -42,7 +41,7 @@ _OTHER: dict[Motion, Motion] = {
 _NOT_JUDGED = {f"other_{motion}_rms_rad": None for motion in _OTHER}
 
 
-def synthetic(study: Study, cache: FitCache) -> dict[str, Any]:
+def synthetic(study: Study) -> Row:
     """Identify each twin with each search.
 
     Returns:
@@ -51,12 +50,8 @@ def synthetic(study: Study, cache: FitCache) -> dict[str, Any]:
     rows, start = [], []
     for case, (short, truth, fitted, methods) in CASES.items():
         for method in (m for m in methods if m in study.searches):
-            row = cache.load_or_run(
-                f"synthetic-{short}-{method}",
-                f"known twin, {case}: {method}",
-                {**study.asked(method, study.seconds), "truth": truth, "fitted": fitted},
-                functools.partial(identify_twin, study, cache.report, case, method),
-            )
+            asked = {**study.asked(method, study.seconds), "truth": truth, "fitted": fitted}
+            row = study.once(f"synthetic-{short}-{method}", asked, identify_twin, case, method)
             rows.append({"case": case, **_NOT_JUDGED, **row})
         unseen = _unseen(study, truth, fitted)
         errors = unseen_errors(LegHypothesis(believed()), unseen, study.threads)
@@ -70,39 +65,33 @@ def _unseen(
     return {_OTHER[m]: record(truth, _OTHER[m], study.seconds) for m in motions}
 
 
-def identify_twin(study: Study, report: Report, case: str, method: str) -> dict[str, Any]:
+def identify_twin(study: Study, case: str, method: str) -> Row:
     """Identify one of ``CASES`` with one search; as ``fit``."""
     _, truth, fitted, _ = CASES[case]
     parameters = tuple(AIR) if case == FIXED else None
     if method == "two-pass":
         parameters = BEYOND_TABLE
     recordings = [record(truth, motion, study.seconds) for motion in fitted]
-    unseen = _unseen(study, truth, fitted)
-    return fit(study, report, method, recordings, unseen, truth, parameters)
+    return fit(study, method, recordings, _unseen(study, truth, fitted), truth, parameters)
 
 
-def paper_size(study: Study, report: Report, method: str) -> dict[str, Any]:
+def paper_size(study: Study, method: str) -> Row:
     """Identify the twin from recordings of the paper's size; as ``fit``, with minutes."""
     parameters = BEYOND_TABLE if method == "two-pass" else None
     recordings, unseen = record_paper(study.paper_seconds), _unseen(study, GROUND, tuple(_OTHER))
-    found = fit(study, report, method, recordings, unseen, GROUND, parameters)
-    return {
-        "recorded_s": 2 * study.paper_seconds,
-        "wall_minutes": found["wall_s"] / 60,
-        "cpu_minutes": found["cpu_s"] / 60,
-        **found,
-    }
+    found = fit(study, method, recordings, unseen, GROUND, parameters)
+    minutes = {f"{kind}_minutes": found[f"{kind}_s"] / 60 for kind in ("wall", "cpu")}
+    return {"recorded_s": 2 * study.paper_seconds, **minutes, **found}
 
 
 def fit(
     study: Study,
-    report: Report,
     method: str,
     recordings: Sequence[Recording],
     unseen: Mapping[Motion, Recording],
     truth: Mapping[str, float],
     parameters: tuple[str, ...] | None,
-) -> dict[str, Any]:
+) -> Row:
     """Identify a known twin by one of ``METHODS`` and compare with the truth.
 
     ``unseen`` recordings judge the fit, ``truth`` is what differs from where it begins; without
@@ -111,15 +100,9 @@ def fit(
     effort = SearchOptions(cma=CmaOptions(study.generations, study.population))
     options = IdentifyOptions(parameters, search=method, effort=effort, threads=study.threads)
     judges = list(unseen.values())
-    with Clock() as clock:
-        identified = identify(
-            recordings,
-            believed(),
-            validate=judges,
-            options=options,
-            seed=study.seed,
-            report=report,
-        )
+    identified, took = timed(
+        lambda: identify(recordings, believed(), validate=judges, options=options, seed=study.seed)
+    )
     known = identified.identifiability
     told = [n for n in known.names if not any(f"'{n}'" in s for s in known.statements)]
     rows = compare(dict(zip(known.names, known.values.tolist(), strict=True)), truth, told)
@@ -129,8 +112,7 @@ def fit(
         "method": METHODS[method],
         **summary(rows),
         **unseen_errors(identified.hypothesis, unseen, study.threads),
-        "wall_s": clock.wall,
-        "cpu_s": clock.cpu,
+        **took,
         "candidates": sum(one.found.evaluations for one in identified.passes),
         "cost": identified.passes[-1].found.cost,
         "parameters": rows,
@@ -140,7 +122,7 @@ def fit(
 
 def compare(
     values: Mapping[str, float], truth: Mapping[str, float], told: Sequence[str]
-) -> list[dict[str, Any]]:
+) -> list[Row]:
     """Return a record per parameter that was fitted, and whether the fit claims to tell it."""
     start = LegHypothesis(believed())
     rows = []
@@ -152,10 +134,10 @@ def compare(
     return rows
 
 
-def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def summary(rows: Sequence[Row]) -> Row:
     """Return how many parameters were fitted and told, and the worst relative errors."""
 
-    def worst(chosen: Sequence[dict[str, Any]]) -> float | None:
+    def worst(chosen: Sequence[Row]) -> float | None:
         errors = [abs(r["error_percent"]) for r in chosen if r["error_percent"] is not None]
         return max(errors, default=None)
 
@@ -170,7 +152,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 def unseen_errors(
     candidate: LegHypothesis, unseen: Mapping[Motion, Recording], threads: int
-) -> dict[str, Any]:
+) -> Row:
     """Return the rms error of joint positions in closed loop on each recording, rad."""
     found = {}
     for name, recording in unseen.items():

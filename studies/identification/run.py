@@ -1,25 +1,19 @@
 """All parts of the benchmark in one run, each kept, and what they say about the project's bars."""
 
-import functools
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
 
-from rich.table import Table
-
-from hopping_leg.cli.identify import FitProgress
-from hopping_leg.cli.options import at_least
+from hopping_leg.cli.options import JsonFile, at_least, show_table
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.identify.result import software_versions
 from hopping_leg.robot.parameters import JOINTS
-from hopping_leg.terminal import plain_console
 from studies.identification.arm import coverage
 from studies.identification.known import FIXED, HOPPING, METHODS, RAIL, paper_size, synthetic
 from studies.identification.real import real
-from studies.identification.study import FitCache, Study
-from studies.shared import host
+from studies.identification.study import Study
+from studies.shared import Row, host
 
 PARTS = ("synthetic", "coverage", "paper-size", "recordings")
 """What can be measured, in order."""
@@ -29,72 +23,11 @@ PAPER_METHODS = ("least-squares", "two-pass")
 """Searches on recordings of the paper's size."""
 
 
-def bench_identify(
-    study: Study,
-    cache: FitCache,
-    *,
-    parts: Sequence[str] = PARTS,
-    recordings: Path | None = None,
-    on_arm: Callable[[int, int], None] = lambda done, total: None,
-) -> dict[str, Any]:
-    """Measure identification.
-
-    Args:
-        study: Sizes and efforts.
-        cache: Keeps each result.
-        parts: Which of ``PARTS``.
-        recordings: Folder with real recordings; None leaves them out.
-        on_arm: Called with independent arms done and in all.
-
-    Returns:
-        An entry per part, and ``bars``: what was to be reached and what was.
-
-    Raises:
-        UsageError: There is no such part or search, or the folder holds no recordings.
-    """
-    for kind, given, known in (
-        ("part of the benchmark", parts, PARTS),
-        ("search", study.searches, tuple(METHODS)),
-    ):
-        for name in given:
-            if name not in known:
-                raise UsageError(unknown_name(kind, name, known))
-    if "least-squares" not in study.searches and "synthetic" in parts:
-        raise UsageError("Known twins are always identified by least squares, too; add it.")
-    sizes = {field.name: getattr(study, field.name) for field in fields(Study)}
-    result: dict[str, Any] = {"study": sizes, "host": host()}
-    if "synthetic" in parts:
-        result["synthetic"] = synthetic(study, cache)
-    if "coverage" in parts:
-        result["coverage"] = cache.load_or_run(
-            "coverage",
-            "independent arms",
-            {"arms": study.arms, "seed": study.seed, "threads": study.threads},
-            lambda: coverage(study.arms, ARM_SECONDS, study.seed, study.threads, on_arm),
-        )
-    if "paper-size" in parts:
-        result["paper_size"] = {
-            "rows": [
-                cache.load_or_run(
-                    f"paper-size-{method}",
-                    f"recordings of the paper's size: {method}",
-                    study.asked(method, study.paper_seconds),
-                    functools.partial(paper_size, study, cache.report, method),
-                )
-                for method in PAPER_METHODS
-                if method in study.searches
-            ]
-        }
-    if "recordings" in parts and recordings is not None:
-        result["recordings"] = real(study, cache, recordings)
-    return {**result, "bars": bars(result), "versions": software_versions()}
-
-
 Bar = tuple[str, float, str, float | None]
 """In words, the bar, its unit, and the number."""
 
 
-def bars(result: dict[str, Any]) -> list[dict[str, Any]]:
+def bars(result: Row) -> list[Row]:
     """Return a record per bar that was measured: what, the bar, the number, whether it is reached.
 
     Args:
@@ -120,7 +53,7 @@ def bars(result: dict[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _known(result: dict[str, Any]) -> list[Bar]:
+def _known(result: Row) -> list[Bar]:
     every = result.get("synthetic", {}).get("rows", [])
     rows = {row["case"]: row for row in every if row["method"] == METHODS["least-squares"]}
     if not rows:
@@ -136,7 +69,7 @@ def _known(result: dict[str, Any]) -> list[Bar]:
     ]
 
 
-def _real(result: dict[str, Any]) -> list[Bar]:
+def _real(result: Row) -> list[Bar]:
     """Return bars of real recordings against the worst of all splits."""
     arms, ahead = ("joint 1", "joint 2"), "double pendulum, {} s ahead, {}, worst split"
     kinds: list[tuple[str, str, str, Sequence[str], str, float, tuple[float, float]]] = [
@@ -170,39 +103,61 @@ class Identify(Study):
     Each result is kept; interrupted, the same command goes on with the next.
     """
 
-    parts: tuple[str, ...] = ()
-    """Of synthetic, coverage, paper-size and recordings; default: all."""
+    parts: tuple[str, ...] = PARTS
+    """Of synthetic, coverage, paper-size and recordings."""
     recordings: Path | None = None
     """Folder with real recordings; default: the environment's HOPPING_LEG_RECORDINGS, if set."""
-    out: Path = Path("runs/bench-identify")
-    """Where results are kept; finished parts are not repeated."""
-    json: Path | None = None
-    """Write every number to this file."""
+    json: JsonFile = None
 
-    def measure(self) -> dict[str, Any]:
-        """Run it, print what was to be reached and what was, return every number."""
+    def measure(self) -> Row:
+        """Run it, print what was to be reached and what was, return every number.
+
+        There is an entry per part, and ``bars``: what was to be reached and what was.
+        """
+        self._check()
+        folder = self.recordings or os.environ.get(_VARIABLE)
+        sizes = {f.name: getattr(self, f.name) for f in fields(Study) if f.name != "out"}
+        result: Row = {"study": sizes, "host": host()}
+        if "synthetic" in self.parts:
+            result["synthetic"] = synthetic(self)
+        if "coverage" in self.parts:
+            asked = {"arms": self.arms, "seed": self.seed, "threads": self.threads}
+            result["coverage"] = self.once("coverage", asked, _coverage)
+        if "paper-size" in self.parts:
+            rows = []
+            for method in (m for m in PAPER_METHODS if m in self.searches):
+                asked = self.asked(method, self.paper_seconds)
+                rows.append(self.once(f"paper-size-{method}", asked, paper_size, method))
+            result["paper_size"] = {"rows": rows}
+        if "recordings" in self.parts and folder is not None:
+            result["recordings"] = real(self, Path(folder))
+        result |= {"bars": bars(result), "versions": software_versions()}
+        show_table(
+            ("what", "bar", "measured", "unit", "reached"),
+            (
+                (row["what"], f"{row['bar']:g}",
+                 "-" if row["measured"] is None else f"{row['measured']:.3g}",
+                 row["unit"], "yes" if row["reached"] else "no")
+                for row in result["bars"]
+            ),
+        )  # fmt: skip
+        return result
+
+    def _check(self) -> None:
         at_least(1, generations=self.generations, threads=self.threads, arms=self.arms)
         at_least(4, population=self.population)
-        at_least(0, seed=self.seed)
-        for name, least in (("seconds", 16), ("paper_seconds", 12)):
-            if not least <= getattr(self, name) <= 3600:
-                raise UsageError(
-                    f"--{name.replace('_', '-')} is {getattr(self, name):g} but must lie between"
-                    f" {least} and 3600."
-                )
-        console, named = plain_console(), os.environ.get(_VARIABLE)
-        with FitProgress() as progress:
-            result = bench_identify(
-                self,
-                FitCache(self.out, lambda words: console.print(f"{words} ..."), progress.update),
-                parts=self.parts or PARTS,
-                recordings=self.recordings or (Path(named) if named else None),
-                on_arm=lambda done, total: progress.update("arms", done / total, 0.0),
-            )
-        table = Table("what", "bar", "measured", "unit", "reached")
-        for row in result["bars"]:
-            measured = "-" if row["measured"] is None else f"{row['measured']:.3g}"
-            reached = "yes" if row["reached"] else "no"
-            table.add_row(row["what"], f"{row['bar']:g}", measured, row["unit"], reached)
-        console.print(table)
-        return result
+        at_least(16, seconds=int(self.seconds))
+        at_least(12, paper_seconds=int(self.paper_seconds))
+        for kind, given, known in (
+            ("part of the benchmark", self.parts, PARTS),
+            ("search", self.searches, tuple(METHODS)),
+        ):
+            for name in given:
+                if name not in known:
+                    raise UsageError(unknown_name(kind, name, known))
+        if "least-squares" not in self.searches and "synthetic" in self.parts:
+            raise UsageError("Known twins are always identified by least squares, too; add it.")
+
+
+def _coverage(study: Study) -> Row:
+    return coverage(study.arms, ARM_SECONDS, study.seed, study.threads)

@@ -1,13 +1,12 @@
-"""What is measured, and results that are kept so that finished parts are not repeated."""
+"""Sizes and efforts, and how a fit is timed and kept."""
 
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Self
+from pathlib import Path
 
-from hopping_leg.evaluate.result import ResultCache
-from hopping_leg.identify.optimizers import Report
-from hopping_leg.identify.result import software_versions
+from hopping_leg.identify.result import Identified, software_versions
+from studies.shared import Row, once
 
 
 @dataclass(frozen=True)
@@ -30,14 +29,16 @@ class Study:
     """Of CMA-ES."""
     searches: tuple[str, ...] = ("least-squares", "cma", "two-pass")
     """Of known twins and of recordings of the paper's size; those that a case has."""
+    out: Path = Path("runs/bench-identify")
+    """Where results are kept; finished parts are not repeated."""
 
-    def asked(self, search: str, seconds: float) -> dict[str, Any]:
-        """Return what a fit's result depends on.
+    def once(self, name: str, asked: Row, work: Callable[..., Row], *arguments: object) -> Row:
+        """Return the kept result of the same work by the same software, or do it and keep it."""
+        asked = {**asked, "software": software_versions()}
+        return once(self.out / f"{name}.json", asked, work, self, *arguments)
 
-        Args:
-            search: How.
-            seconds: Of each recording.
-        """
+    def asked(self, search: str, seconds: float) -> Row:
+        """Return what a fit to recordings of so many seconds depends on."""
         effort = {"generations": self.generations, "population": self.population}
         return {
             "search": search,
@@ -48,32 +49,8 @@ class Study:
         }
 
 
-@dataclass(frozen=True)
-class FitCache(ResultCache):
-    """Also knows software and tells of fits.
-
-    Attributes:
-        report: Told how a fit goes.
-    """
-
-    report: Report = lambda stage, share, cost: None
-
-    def load_or_run(
-        self, name: str, words: str, asked: dict[str, Any], work: Callable[[], dict[str, Any]]
-    ) -> dict[str, Any]:
-        """Return the kept result of the same work by the same software, or do it and keep it."""
-        return super().load_or_run(name, words, {**asked, "software": software_versions()}, work)
-
-
-class Clock:
-    """Wall and processor seconds since it was started, over all threads, as a context manager."""
-
-    def __enter__(self) -> Self:
-        """Start."""
-        self._wall, self._cpu = time.perf_counter(), time.process_time()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Stop."""
-        self.wall = time.perf_counter() - self._wall
-        self.cpu = time.process_time() - self._cpu
+def timed(work: Callable[[], Identified]) -> tuple[Identified, Row]:
+    """Return a fit, and its wall and processor seconds over all threads."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    found = work()
+    return found, {"wall_s": time.perf_counter() - wall, "cpu_s": time.process_time() - cpu}

@@ -7,8 +7,8 @@ from hopping_leg.identify.plan import make_plan
 from hopping_leg.robot import COARSE_TIMESTEP, load_robot
 from studies.identification.known import FIXED, compare, identify_twin, summary
 from studies.identification.real import real
-from studies.identification.run import Identify, bars, bench_identify
-from studies.identification.study import FitCache, Study
+from studies.identification.run import Identify, bars
+from studies.identification.study import Study
 from studies.identification.twin import AIR, record, twin
 from studies.shared import main
 
@@ -17,15 +17,6 @@ def test_twins_are_recorded_with_a_finer_step_than_fits_take():
     recording = record(AIR, "swings", 16.0)
     plan = make_plan([recording], load_robot("legv2"))
     assert recording.trace.header["timestep_s"] < plan.timestep == COARSE_TIMESTEP
-
-
-def test_work_is_done_once(tmp_path):
-    begun = []
-    cache = FitCache(tmp_path, begun.append)
-    for asked, number in (({"size": 1}, 7), ({"size": 1}, 8), ({"size": 2}, 9)):
-        result = cache.load_or_run("part", "words", asked, lambda n=number: {"number": n})
-        assert result == {"number": 7 if asked["size"] == 1 else 9}
-    assert len(begun) == 2
 
 
 def test_errors_are_relative_to_the_truth_and_claims_are_counted():
@@ -58,9 +49,9 @@ def test_bars_know_which_side_is_better():
 
 def test_bad_input_is_one_sentence(tmp_path):
     with pytest.raises(UsageError, match=r"'physics'.*synthetic"):
-        bench_identify(Study(), FitCache(tmp_path), parts=["physics"])
+        Identify(parts=("physics",)).measure()
     with pytest.raises(UsageError, match="legv2_fixed_base"):
-        real(Study(), FitCache(tmp_path), tmp_path)
+        real(Study(), tmp_path)
     assert main("identification", Identify, ["--population", "1"]) == 2
     assert main("identification", Identify, ["--seconds", "8"]) == 2
 
@@ -82,7 +73,7 @@ def test_the_command_measures_keeps_and_goes_on(tmp_path):
 
 @pytest.mark.slow
 def test_a_known_twin_is_found():
-    row = identify_twin(Study(threads=1), lambda *_: None, FIXED, "least-squares")
+    row = identify_twin(Study(threads=1), FIXED, "least-squares")
     assert row["worst_identifiable_error_percent"] < 0.5
     assert row["identifiable"] == 8
     assert row["other_swings_rms_rad"] < 1e-3
@@ -91,5 +82,5 @@ def test_a_known_twin_is_found():
 
 @pytest.mark.slow
 def test_intervals_hold_the_truth_of_independent_arms(tmp_path):
-    result = bench_identify(Study(arms=12, seed=500), FitCache(tmp_path), parts=["coverage"])
+    result = Identify(arms=12, seed=500, parts=("coverage",), out=tmp_path).measure()
     assert result["coverage"]["share_inside"] > 0.9
