@@ -20,7 +20,6 @@ class Accuracy:
     worst_error_m: float
     """Largest magnitude of the median error of a command."""
     mean_error_m: float
-    """Mean magnitude of the median errors."""
     lower_std_m: float
     """Largest standard deviation of the apexes at commands up to ``LOWER``."""
     worst_std_m: float
@@ -34,11 +33,9 @@ class Accuracy:
 
 
 def accuracies(rows: Iterable[Mapping[str, Any]], highest: float) -> dict[str, Accuracy]:
-    """Return the accuracy of every controller of an evaluation.
+    """Return the accuracy of every controller of an evaluation, at commands up to ``highest``, m.
 
-    Args:
-        rows: An evaluation's ``summary``, as JSON values.
-        highest: Commands above this do not count, m.
+    ``rows`` are its ``summary``, as JSON values.
     """
     rows_of: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
@@ -49,19 +46,14 @@ def accuracies(rows: Iterable[Mapping[str, Any]], highest: float) -> dict[str, A
 
 def _accuracy(rows: list[Mapping[str, Any]]) -> Accuracy:
     errors = [abs(_known(row["median_error_m"])) for row in rows]
-    spreads = {row["command_m"]: _known(row["std_m"]) for row in rows}
+    spreads = [_known(row["std_m"]) for row in rows]
+    lower = [s for s, row in zip(spreads, rows, strict=True) if row["command_m"] <= LOWER]
+    flights = [row["flight_fraction"] for row in rows]
     return Accuracy(
-        worst_error_m=max(errors),
-        mean_error_m=mean(errors),
-        lower_std_m=max((s for c, s in spreads.items() if c <= LOWER), default=0.0),
-        worst_std_m=max(spreads.values()),
-        mean_std_m=mean(spreads.values()),
-        skipped_hops=sum(row["skipped_hops"] for row in rows),
-        body_contacts=sum(row["body_contacts"] for row in rows),
-        fewest_hops_per_s=min(row["hop_rate_hz"] for row in rows),
-        least_flight=min(row["flight_fraction"] for row in rows),
-        mean_flight=mean(row["flight_fraction"] for row in rows),
-    )
+        max(errors), mean(errors), max(lower, default=0.0), max(spreads), mean(spreads),
+        sum(row["skipped_hops"] for row in rows), sum(row["body_contacts"] for row in rows),
+        min(row["hop_rate_hz"] for row in rows), min(flights), mean(flights),
+    )  # fmt: skip
 
 
 def _known(value: float | None) -> float:

@@ -2,7 +2,6 @@
 
 RESULTS = (
     "python -m studies.speed env --json studies/speed/results/env.json",
-    "python -m studies.speed identify --json studies/speed/results/identify.json",
     "python -m studies.speed inference --json studies/speed/results/inference.json",
     "python -m studies.speed view --json studies/speed/results/view.json",
     "python -m studies.speed deploy --json studies/speed/results/deploy.json",
