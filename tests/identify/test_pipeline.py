@@ -12,10 +12,11 @@ from hopping_leg.identify.optimizers import SearchOptions
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import identify
 from hopping_leg.identify.plan import make_plan
+from hopping_leg.identify.recording_format import PAIRS
 from hopping_leg.identify.result import as_json
 from hopping_leg.robot import check_physics, load_robot
 from tests.identify.fitting import EFFORT, RATE, TRUTH, TWIN, identified, options, run
-from tests.identify.twin import LEG, changed, record, swing
+from tests.identify.twin import LEG, changed, record, swing, tracked
 
 STEPS_APART = 5e-4
 """What twins that were recorded in larger physics steps than the plan's differ by, rad."""
@@ -199,3 +200,37 @@ def test_a_motor_is_not_believed_slower_than_its_joint_was_seen():
     assert low(0.0) == known / 4
     assert low(15 / seen) == pytest.approx(0.8 * 15 * LEG.knee.belt_ratio)
     assert low(100 / seen) == known
+
+
+OF_A_JOINT = ("position", "velocity", "torque", "position_command", "velocity_command")
+
+
+def test_the_legs_own_recording_is_believed_in_a_mirror_too():
+    start, every = LegHypothesis(LEG), [c for name in OF_A_JOINT for c in PAIRS[name]]
+    pipeline._check_conventions(tracked(), start)
+    pipeline._check_conventions(changed(tracked(), -pl.col(every)), start)
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+@pytest.mark.parametrize("names", [OF_A_JOINT, ("torque",)], ids=["joint", "torque"])
+def test_a_joint_in_a_mirror_and_a_torque_against_its_motion_are_refused(names, joint):
+    mirrored = changed(tracked(), -pl.col([PAIRS[name][joint] for name in names]))
+    with pytest.raises(RecordingError, match="sign"):
+        identify([mirrored], LEG, options=options())
+
+
+@pytest.mark.parametrize("turns", [1, 2])
+@pytest.mark.parametrize("joint", [0, 1])
+def test_a_zero_elsewhere_is_refused(joint, turns):
+    columns = [PAIRS[name][joint] for name in ("position", "position_command")]
+    turned = changed(tracked(), pl.col(columns) + turns * np.pi / 2)
+    with pytest.raises(RecordingError, match="zero"):
+        identify([turned], LEG, options=options())
+
+
+@pytest.mark.parametrize("joint", ["hip", "knee"])
+def test_one_joint_alone_is_refused_before_any_fit(joint):
+    lacking = PAIRS["position"][joint == "knee"]
+    run = changed(tracked(), pl.lit(None, pl.Float64).alias(lacking))
+    with pytest.raises(RecordingError, match=f"no positions of the {joint}.*both joints"):
+        identify([run], LEG, options=options())

@@ -13,7 +13,15 @@ from hopping_leg.identify.importers import IMPORTERS, recognise
 from hopping_leg.identify.recording import load_recording, make_recording
 from hopping_leg.identify.recording_format import COLUMNS, PAIRS
 from hopping_leg.robot import load_robot
-from tests.identify.runs import METADATA, RECORDINGS, SIDECAR, needs_recordings, swinging, write_run
+from tests.identify.runs import (
+    METADATA,
+    RECORDINGS,
+    SIDECAR,
+    needs_recordings,
+    rig_log,
+    swinging,
+    write_run,
+)
 
 POSITIONS = ["hip_position_rad", "knee_position_rad"]
 VELOCITIES = ["hip_velocity_rad_s", "knee_velocity_rad_s"]
@@ -51,15 +59,49 @@ def test_the_native_form_keeps_everything(tmp_path):
     assert load_recording(tmp_path / "again.parquet").trace.table.equals(back.trace.table)
 
 
-def test_gzip_plain_and_foreign_parquet_read_the_same(tmp_path):
+@pytest.mark.parametrize(
+    ("mark", "comment"), [(",", ""), (";", "# leg 2"), ("\t", "# leg, 2"), (", ", "")]
+)
+def test_every_form_of_a_table_reads_the_same(tmp_path, mark, comment):
     path = write_run(tmp_path, swinging())
     plain = load_recording(path)
-    packed = tmp_path / "run.csv.gz"
-    packed.write_bytes(gzip.compress(path.read_bytes()))
     foreign = tmp_path / "run.parquet"
     pl.read_csv(path).write_parquet(foreign)
-    assert load_recording(packed).trace.table.equals(plain.trace.table)
-    assert load_recording(foreign).trace.table.equals(plain.trace.table)
+    text = f"{comment}\n" + path.read_text().replace(",", mark).replace("\n", "\r\n")
+    other, packed = tmp_path / "run.txt", tmp_path / "run.csv.gz"
+    other.write_text(text, encoding="utf-8-sig" if not comment else "utf-8")
+    packed.write_bytes(gzip.compress(other.read_bytes()))
+    for file in (foreign, other, packed):
+        assert load_recording(file).trace.table.equals(plain.trace.table)
+
+
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        (b"", "no whole table"),
+        (b"# nothing\n", "no whole table"),
+        (b"0,1\n1,2\n", "has no header"),
+        (b"a,a\n1,2\n", "equal names"),
+        (b"a,b\n1,2,3\n", "no whole table"),
+        (gzip.compress(b"a,b\n1,2\n")[:-6], "no whole table"),
+        (b"time_s,hip_position_rad\ns,0\n", "column 'time_s' must hold Float64.*\"s\""),
+    ],
+)
+def test_what_is_no_table_is_refused(tmp_path, content, named):
+    path = write_run(tmp_path, swinging())
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=rf"run\.csv.* {named}"):
+        load_recording(path)
+
+
+@pytest.mark.parametrize("clock", ["t", "time"])
+def test_a_rigs_own_log_is_known_by_either_name_of_its_clock(tmp_path, clock):
+    path, other = tmp_path / "log.csv", tmp_path / "designC0_run.csv"
+    for file in (path, other):
+        rig_log(clock).write_csv(file)
+    assert load_recording(path).metadata.robot == "doublependulum"
+    with pytest.raises(RecordingError, match=r"design C\.0.*another robot.*sidecar"):
+        load_recording(other)
 
 
 def test_a_sidecar_may_name_the_columns(tmp_path):

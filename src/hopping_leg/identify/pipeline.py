@@ -13,8 +13,8 @@ from hopping_leg.identify.optimizers import Pass, Report, Searcher, SearchOption
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import FitPlan, check_recordings, make_plan
 from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.recording_format import PAIRS
 from hopping_leg.identify.result import Identified
-from hopping_leg.identify.torque_balance import check_balance
 from hopping_leg.identify.windows import SHORTEST, cut, duration, hold_out
 from hopping_leg.robot import NO_MISMATCH, Robot, check_physics
 
@@ -81,7 +81,7 @@ def identify(
             )
     fit, held, split = _split(recordings, validate, plan, seed)
     for recording in (*recordings, *validate):
-        check_balance(recording, robot)
+        _check_conventions(recording, plan.start)
     windows = cut(fit, plan.window, unscored=plan.unscored)
     objective = Objective(
         tuple(fit), tuple(windows), plan.parameters, plan.scoring, plan.timestep, options.threads
@@ -111,6 +111,64 @@ def _file_bounds(robot: Robot) -> dict[str, tuple[float, float]]:
         least = max(motor.torque_limit, motor.rated_torque)
         bounds[f"{name}.motor.peak_torque"] = (least, 4 * motor.peak_torque)
     return bounds
+
+
+_RIGHT = ((1, 1), (1, 1), (0, 0))
+_QUARTERS = [(turns, 0) for turns in (-1, 1, 2)] + [(0, turns) for turns in (-1, 1, 2)]
+_MISTAKES = {
+    "the sign of hip or knee, with its angle, velocity, torque and commands, were another": [
+        ((1, -1), (1, -1), (0, 0))
+    ],
+    "the sign of the hip's torque were another": [((1, 1), (-1, 1), (0, 0))],
+    "the sign of the knee's torque were another": [((1, 1), (1, -1), (0, 0))],
+    "the zero of hip or knee were some quarter turns on": [
+        ((1, 1), (1, 1), turns) for turns in _QUARTERS
+    ],
+}
+"""Signs of angles and torques, and quarter turns of angles, hip and knee, that undo a mistake."""
+_SOON = 0.2  # s, over which the robot to start from predicts well enough to tell
+_BETTER, _TOLD = 1.8, 0.5
+"""Times that others must explain more, and what they may leave unexplained of both joints."""
+
+
+def _check_conventions(recording: Recording, start: LegHypothesis) -> None:
+    """Refuse a clamped leg's recording whose motion follows far better with other conventions."""
+    driven = validation.as_torque_driven(recording)
+    if recording.metadata.rig != "fixed-base" or not driven.has("torque_command"):
+        return
+    given = _unexplained(driven, start, *_RIGHT)
+    left = {m: min(_unexplained(driven, start, *c) for c in cs) for m, cs in _MISTAKES.items()}
+    likely = min(left, key=lambda mistake: left[mistake])
+    if left[likely] < _TOLD and given > _BETTER * left[likely]:
+        raise RecordingError(
+            f"{recording.name}: the motion would follow from the torques"
+            f" {given / left[likely]:.3g} times better if {likely}; a leg that hangs straight is at"
+            " zero, and a positive torque accelerates towards positive angles."
+        )
+
+
+def _unexplained(
+    driven: Recording,
+    start: LegHypothesis,
+    angles: tuple[int, int],
+    torques: tuple[int, int],
+    turns: tuple[int, int],
+) -> float:
+    """Return the share of the motion that its torques do not predict, infinite if unknown."""
+    changes = {}
+    for joint in range(2):
+        for name in ("position", "velocity", "position_estimate", "velocity_estimate"):
+            shift = turns[joint] * np.pi / 2 if name.startswith("position") else 0.0
+            changes[PAIRS[name][joint]] = (angles[joint], shift)
+        changes[PAIRS["torque_command"][joint]] = (torques[joint], 0.0)
+    table = driven.trace.table
+    table = table.with_columns(
+        sign * table[name] + shift for name, (sign, shift) in changes.items() if name in table
+    )
+    driven = replace(driven, trace=replace(driven.trace, table=table))
+    errors = np.array(validation.open_loop([driven], start, _SOON))
+    spread = np.nanstd(driven.array("position"), axis=0)
+    return float(np.nan_to_num(np.sum((errors / np.maximum(spread, 1e-6)) ** 2), nan=np.inf))
 
 
 def _split(

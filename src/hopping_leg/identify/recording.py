@@ -4,7 +4,9 @@ Native files are traces (Parquet) whose header holds the metadata; CSV and forei
 need a sidecar, or come from one of the known rigs.
 """
 
+import gzip
 import hashlib
+import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
@@ -18,12 +20,13 @@ from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import RecordingError, UsageError, unknown_name
 from hopping_leg.formats import bag_reader
 from hopping_leg.identify import importers, recording_checks, unit_checks
-from hopping_leg.identify.csv_table import read_csv
 from hopping_leg.identify.recording_format import COLUMNS, PAIRS, RecordingMetadata, float_column
 from hopping_leg.io import parse_toml, read_dataclass
 from hopping_leg.trace import Trace, read_parquet
 
-_KEY, _PARQUET = "recording", b"PAR1"
+_KEY, _PARQUET, _GZIP = "recording", b"PAR1", b"\x1f\x8b"
+_BAGS = (".mcap", ".db3")
+_UNREADABLE = (pl.exceptions.PolarsError, pl.exceptions.PanicException)
 
 
 @dataclass(frozen=True)
@@ -136,7 +139,8 @@ def load_recording(path: str | Path) -> Recording:
                 f" {', '.join(table.columns[:12])}."
             )
         importer.check_path(path)
-        table, metadata = importer.read(table)
+        kinds = {c: pl.String if COLUMNS.get(c) is pl.String else pl.Float64 for c in table.columns}
+        table, metadata = importer.read(_cast(table, kinds, origin))
         names = importer.columns
     return make_recording(table, metadata, origin, names=names, header=header, digest=digest)
 
@@ -144,23 +148,48 @@ def load_recording(path: str | Path) -> Recording:
 def _read(path: Path, origin: str) -> tuple[pl.DataFrame, dict[str, Any], str]:
     """Return a file's or bag's own table, its header, and the SHA-256 of its bytes."""
     try:
-        files = bag_reader.bag_files(path)
-        contents = [file.read_bytes() for file in files or [path]]
+        bag = path.is_dir() or path.suffix in _BAGS
+        files = bag_reader.bag_files(path) if bag else []
+        content = b"".join(file.read_bytes() for file in files or [path])
     except FileNotFoundError as error:
         raise RecordingError(f"There is no recording {path}.") from error
     except IsADirectoryError as error:
         raise RecordingError(f"{path} is a folder without .mcap or .db3 files, no bag.") from error
     except OSError as error:
         raise RecordingError(f"Cannot read the recording {path}: {error.strerror}.") from error
-    content = b"".join(contents)
     digest = hashlib.sha256(content).hexdigest()
     if files:
         return *bag_reader.read_bag(path, origin), digest
-    if not content:
-        raise RecordingError(f"{path} is empty; record again.")
     if content.startswith(_PARQUET):
         return *_native(path, content), digest
-    return read_csv(content, origin), {}, digest
+    return _read_csv(content, origin), {}, digest
+
+
+def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
+    """Return a table from text, plain or gzip, with comma, semicolon or tab between its fields.
+
+    Columns of numbers, true and false are floats, empty fields null; lines after a # are skipped.
+    """
+    try:
+        if content.startswith(_GZIP):
+            content = gzip.decompress(content)
+        header = next((n for n in content.splitlines() if n.strip() and n[:1] != b"#"), b"")
+        mark = next((m for m in "\t;" if m.encode() in header), ",")
+        texts = pl.read_csv(content, separator=mark, comment_prefix="#", infer_schema=False)
+    except (OSError, EOFError, zlib.error, *_UNREADABLE) as error:
+        raise RecordingError(
+            f"{origin} is no whole table of text ({str(error).partition(chr(10))[0]}); write its"
+            " columns as CSV or Parquet, in SI units."
+        ) from error
+    names = pl.Series(texts.columns)
+    if names.str.contains("_duplicated_").any() or names.cast(float, strict=False).count():
+        raise RecordingError(f"{origin} has no header, or equal names; name each of its columns.")
+    columns = []
+    for words in texts.rename(str.strip).select(pl.all().str.strip_chars().replace("", None)):
+        flags = words.str.to_lowercase().replace({"true": "1", "false": "0"})
+        numbers = flags.cast(pl.Float64, strict=False)
+        columns.append(numbers if numbers.null_count() == words.null_count() else words)
+    return pl.DataFrame(columns)
 
 
 def sidecar_path(path: Path) -> Path:
@@ -173,8 +202,7 @@ def _native(path: Path, content: bytes) -> tuple[pl.DataFrame, dict[str, Any]]:
     table, metadata = read_parquet(content, str(path), RecordingError)
     if "hopping_leg" in metadata:
         return table, dict(Trace.of(table, metadata, path).header)
-    kinds = {c: pl.String if COLUMNS.get(c) is pl.String else pl.Float64 for c in table.columns}
-    return _cast(table, kinds, str(path)), {}
+    return table, {}
 
 
 def _sidecar(path: Path) -> tuple[str, dict[str, Any]] | None:
@@ -210,11 +238,12 @@ def _apply(
 
 def _cast(table: pl.DataFrame, kinds: Mapping[str, type[pl.DataType]], origin: str) -> pl.DataFrame:
     series = []
-    for name, kind in ((n, k) for n, k in kinds.items() if n in table.columns):
+    for name in (name for name in kinds if name in table):
         try:
-            series.append(table[name].cast(kind))
+            series.append(table[name].cast(kinds[name]))
         except pl.exceptions.PolarsError as error:
+            said = str(error).partition("\n")[0]
             raise RecordingError(
-                f"{origin}: column '{name}' holds {table[name].dtype} but must hold {kind}."
+                f"{origin}: column '{name}' must hold {kinds[name]}: {said}."
             ) from error
     return pl.DataFrame(series)

@@ -44,13 +44,8 @@ def validate(
     windows = cut(controlled, None, unscored=_unscored(recordings))
     effort = (hypothesis, timestep, threads)
     position, torque = _errors(controlled, windows, *effort, "position", "torque")
-    predicted = {}
-    rows = [max(s.stop - s.start for s in r.segments()) for r in recordings]
-    for horizon in HORIZONS:
-        pairs = zip(recordings, rows, strict=True)
-        long_enough = [r for r, n in pairs if n >= max(3, round(horizon * r.metadata.rate_hz))]
-        predicted[horizon] = open_loop(long_enough, hypothesis, horizon, timestep, threads)
-    return Validation(position, torque, predicted)
+    ahead = {h: open_loop(recordings, hypothesis, h, timestep, threads) for h in HORIZONS}
+    return Validation(position, torque, ahead)
 
 
 def open_loop(
@@ -63,8 +58,15 @@ def open_loop(
     """Return the rms position error of predictions restarted every half horizon, rad.
 
     The motors get the measured torque, or the commanded one where the rig drives torques itself.
+    A recording that is shorter than the horizon, s, is left out.
     """
-    driven = [d for d in map(as_torque_driven, recordings) if d.has("torque_command")]
+    driven = [
+        as_torque_driven(r)
+        for r in recordings
+        if max(s.stop - s.start for s in r.segments())
+        >= max(3, round(horizon * r.metadata.rate_hz))
+    ]
+    driven = [d for d in driven if d.has("torque_command")]
     windows = [w for w in cut(driven, horizon, stride=horizon / 2) if _starts_known(driven, w)]
     return _errors(driven, windows, hypothesis, timestep, threads, "position")[0]
 
