@@ -4,7 +4,8 @@ import re
 import pytest
 
 from hopping_leg.evaluate import EvaluationRun
-from hopping_leg.evaluate.report import verdict, write_report
+from hopping_leg.evaluate.report import write_report
+from hopping_leg.evaluate.tables import verdict
 from hopping_leg.evaluate.video import Video
 
 COMMAND = "hop evaluate spring --commands 0.25,0.35"
@@ -75,7 +76,8 @@ def test_a_verdict_names_the_worst_height_and_everything_that_went_wrong(judged)
 
     assert said(low, high) == (
         "misses its command by 2.2 mm in the median of 2 heights and by 3.4 mm at the worst,"
-        " 0.35 m; skips 2 of 100 hops; base or knee touch the ground once."
+        " 0.35 m; skips 2 of 100 hops; base or knee touch the ground once; rises at every step of"
+        " the staircase."
     )
     still = dataclasses.replace(high, hops=0, median_error_m=float("nan"))
     assert "does not hop at 0.35 m" in said(low, still)

@@ -101,7 +101,6 @@ class Evaluate(Conditions):
 def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     """Evaluate controllers, print the table, write what was asked for; notes come first there."""
     from hopping_leg.evaluate import tables, trials
-    from hopping_leg.evaluate.report import render_videos, write_report
 
     command = options.command_line("hop evaluate", args)
     if args.suite == "robustness":
@@ -123,6 +122,8 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     if args.traces:
         trials.save_traces(judged.runs, args.traces)
     if args.report:
+        from hopping_leg.evaluate.report import render_videos, write_report
+
         with progress.said_if_slow("Writing the report."):
             videos = render_videos(judged, setup.robot) if args.video else None
             io.write_atomically(args.report, write_report(judged, videos))

@@ -168,17 +168,6 @@ class Evaluation:
         return json_text(self.to_json()).encode()
 
 
-def flat_conditions(entries: dict[str, Any]) -> dict[str, str]:
-    """Return conditions as texts, those of an inner table with its name before theirs."""
-    found: dict[str, str] = {}
-    for name, value in entries.items():
-        inner = value if isinstance(value, dict) else {"": value}
-        for key, entry in inner.items():
-            text = f"{entry:g}" if isinstance(entry, float) else str(entry)
-            found[f"{name} {key}".strip().replace("_", " ")] = text
-    return found
-
-
 def _rounded(value: Any) -> Any:  # noqa: ANN401
     """Round numbers to nine digits after the point; small p-values stay as they are."""
     if isinstance(value, dict):

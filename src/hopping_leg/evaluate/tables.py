@@ -1,8 +1,12 @@
-"""Results as tables, in HTML for pages and in text for the terminal; lengths in mm."""
+"""Results in words and tables, one list of columns for the terminal and for pages; lengths in mm.
+
+Rows are the values of the JSON.
+"""
 
 import itertools
-import math
+import textwrap
 from collections.abc import Callable, Sequence
+from statistics import median
 from typing import Any
 
 from markupsafe import Markup
@@ -10,75 +14,68 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from hopping_leg.evaluate.result import Comparison, Estimator, Evaluation, Group, Staircase, Summary
+from hopping_leg.evaluate.result import Evaluation, Summary
 from hopping_leg.html_page import Column, table
 from hopping_leg.terminal import print_table
 
+Row = dict[str, Any]
+_NARROW = 8  # characters of a heading on a line of the terminal
 
-def millimetres(value: float, sign: bool = False) -> str:
+
+def millimetres(value: float | None, sign: bool = False) -> str:
     """Return a length in mm; a dash where there is none."""
-    return f"{1e3 * value:{'+' if sign else ''}z.1f}" if value == value else "-"
+    there = value is not None and value == value
+    return f"{1e3 * value:{'+' if sign else ''}z.1f}" if there else "-"  # type: ignore[operator]
+
+
+def _positive(value: float) -> bool:
+    return value > 0
 
 
 def column(
     heading: str,
     name: str,
     form: str = "",
-    scale: float = 1.0,
-    unit: str = "",
+    scale: float = 1,
     bad: Callable[[Any], bool] = lambda _value: False,
 ) -> Column:
-    """Return the column of an entry of rows, be they dataclasses or JSON values."""
+    """Return the column of an entry that rows have, scaled and formatted; a dash for None."""
 
-    def entry(row: Any) -> Any:  # noqa: ANN401
-        return row[name] if isinstance(row, dict) else getattr(row, name)
+    def text(row: Row) -> str:
+        value = row[name]
+        return "-" if value is None else format(value if scale == 1 else scale * value, form)
 
-    def text(row: Any) -> str:  # noqa: ANN401
-        value = entry(row)
-        if value is None or value != value:
-            return "-"
-        return format(value * scale if scale != 1 else value, form) + unit
-
-    return Column(heading, text, lambda row: bad(entry(row)))
+    return Column(heading, text, lambda row: row[name] is not None and bad(row[name]))
 
 
-def _percent(heading: str, name: str) -> Column:
-    return column(heading, name, ".0f", 100, " %")
-
-
-def _interval(row: Summary | Group) -> str:
-    low = millimetres(row.median_error_low_m, sign=True)
-    return f"{low} to {millimetres(row.median_error_high_m, sign=True)}"
-
-
-def _positive(value: float | None) -> bool:
-    return value is not None and value > 0
+def _pair(heading: str, form: str, *names: str, sign: bool = False) -> Column:
+    """Return a column of two lengths, put into a form such as ``"{} to {}"``."""
+    return Column(heading, lambda row: form.format(*(millimetres(row[n], sign) for n in names)))
 
 
 _CONTROLLER = column("controller", "controller")
 _COMMAND = column("command / m", "command_m", ".2f")
 _ERROR = column("median error / mm", "median_error_m", "+z.1f", 1e3)
-_INTERVAL = Column("95 % interval / mm", _interval)
+_INTERVAL = _pair(
+    "95 % interval / mm", "{} to {}", "median_error_low_m", "median_error_high_m", sign=True
+)
 _STD = column("std / mm", "std_m", ".1f", 1e3)
 _HOPS = column("hops", "hops")
 _SKIPPED = column("skipped", "skipped_hops", bad=_positive)
+_RATE = column("hops / s", "hop_rate_hz", ".2f")
+_FLIGHT = column("flight / %", "flight_fraction", ".0f", 100)
+_LOWEST = column("lowest base / mm", "min_base_height_m", ".0f", 1e3)
 _CONTACTS = column("body contacts", "body_contacts", bad=_positive)
 
+SHORT = (_CONTROLLER, _COMMAND, _ERROR, _STD, _HOPS, _SKIPPED, _FLIGHT, _LOWEST, _CONTACTS)
+"""What the terminal shows of the summary."""
+
 SUMMARY = (
-    _CONTROLLER,
-    _COMMAND,
-    _ERROR,
-    _INTERVAL,
-    _STD,
-    column("IQR / mm", "iqr_m", ".1f", 1e3),
-    _HOPS,
-    _SKIPPED,
-    column("hops / s", "hop_rate_hz", ".2f"),
-    column("flight / %", "flight_fraction", ".0f", 100),
-    column("sink / mm", "max_sink_m", ".0f", 1e3),
-    column("lowest base / mm", "min_base_height_m", ".0f", 1e3),
-    _CONTACTS,
+    *(_CONTROLLER, _COMMAND, _ERROR, _INTERVAL, _STD, column("IQR / mm", "iqr_m", ".1f", 1e3)),
+    *(_HOPS, _SKIPPED, _RATE, _FLIGHT, column("sink / mm", "max_sink_m", ".0f", 1e3)),
+    *(_LOWEST, _CONTACTS),
 )
+LADDER = (_CONTROLLER, _COMMAND, _ERROR, _STD, _HOPS, _SKIPPED, _CONTACTS)
 
 LOAD = (
     _CONTROLLER,
@@ -88,10 +85,7 @@ LOAD = (
     column("RMS hip / N m", "rms_hip_torque_nm", ".1f"),
     column("RMS knee / N m", "rms_knee_torque_nm", ".1f"),
     column("RMS of rated / %", "rated_torque_share", ".0f", 100, bad=lambda share: share > 1),
-    Column(
-        "limited after / min",
-        lambda r: f"{r.thermal_minutes:.1f}" if math.isfinite(r.thermal_minutes) else "-",
-    ),
+    column("limited after / min", "thermal_minutes", ".1f"),
     column("mechanical / W", "mean_power_w", ".1f"),
     column("electrical / W", "mean_electrical_power_w", ".1f"),
     column("peak braking / W", "peak_regeneration_w", ".0f"),
@@ -109,8 +103,6 @@ JOINTS = (
     column("stop contacts", "stop_contacts", bad=_positive),
 )
 
-LADDER = (_CONTROLLER, _COMMAND, _ERROR, _STD, _HOPS, _SKIPPED, _CONTACTS)
-
 GROUPS = (
     column("group", "group"),
     _COMMAND,
@@ -124,110 +116,126 @@ GROUPS = (
     _CONTACTS,
 )
 
-_SHORT = (
+ESTIMATORS = (
     _CONTROLLER,
-    column("cmd", "command_m", ".0f", 1e3),
-    column("error", "median_error_m", "+z.1f", 1e3),
-    column("std", "std_m", ".1f", 1e3),
+    _pair("in flight / mm", "{} ± {}", "flight_bias_m", "flight_std_m"),
+    _pair("in stance / mm", "{} ± {}", "stance_bias_m", "stance_std_m"),
+    _pair("apex, after landing / mm", "{} ± {}", "apex_bias_m", "apex_std_m"),
     _HOPS,
-    column("skip", "skipped_hops"),
-    column("1/s", "hop_rate_hz", ".2f"),
-    _percent("flight", "flight_fraction"),
-    column("base", "min_base_height_m", ".0f", 1e3),
-    column("contacts", "body_contacts"),
-    _percent("out", "outside_limits_fraction"),
+)
+
+_NEIGHBOURS = (
+    _CONTROLLER,
+    column("lower command / m", "lower_m", ".2f"),
+    column("higher command / m", "upper_m", ".2f"),
+    column("p, rank sums of runs", "p", ".1g", bad=lambda p: p >= 1e-3),
+    column("Cliff's delta", "cliffs_delta", "+.3f"),
+    column("95 % from", "cliffs_delta_low", "+.3f"),
+    column("to", "cliffs_delta_high", "+.3f"),
+    column("hops in the overlap / %", "overlap", ".1f", 100),
 )
 
 
-def neighbour_table(comparisons: Sequence[Comparison]) -> Markup:
-    """Return the tests between neighbouring commands."""
-    p = column("", "p", ".3f")
-    low, high = (column("", f"cliffs_delta_{end}", "+.3f") for end in ("low", "high"))
-    columns = (
-        _CONTROLLER,
-        Column("commands / m", lambda r: f"{r['lower_m']:.2f} and {r['upper_m']:.2f}"),
-        Column(
-            "p, rank sums of runs",
-            lambda r: "< 0.001" if r["p"] < 1e-3 else p.text(r),
-            lambda r: not r["p"] < 1e-3,
+def evaluation_tables(evaluation: Row) -> dict[str, Markup]:
+    """Return every table of a page, by what it is about, from an evaluation's JSON."""
+    secondary, summary = evaluation["secondary"], evaluation["summary"]
+    neighbours = [
+        {"controller": one["controller"], **pair}
+        for one in evaluation["neighbours"]
+        for pair in one["neighbours"]
+    ]
+    return {
+        "summary": table(SUMMARY, summary),
+        "secondary": table(SUMMARY, secondary["summary"] if secondary else []),
+        "groups": table(GROUPS, evaluation["groups"]),
+        "load": table(LOAD, summary),
+        "joints": table(JOINTS, summary),
+        "ladder": table(LADDER, evaluation["ladder"]),
+        "distributions": table(_NEIGHBOURS, neighbours),
+        "staircase": _staircase_table(evaluation["staircase"]),
+        "estimators": table(
+            ESTIMATORS, evaluation["estimators"], "estimated minus true, mean ± standard deviation"
         ),
-        column("Cliff's delta", "cliffs_delta", "+.3f"),
-        Column("95 % interval", lambda r: f"{low.text(r)} to {high.text(r)}"),
-        column("hops in the overlap", "overlap", ".1f", 100, " %"),
-    )
-    return table(
-        columns,
-        [{"controller": c.controller, **vars(n)} for c in comparisons for n in c.neighbours],
-    )
+    }
 
 
-def staircase_table(stairs: Sequence[Staircase]) -> Markup:
+def _staircase_table(stairs: Sequence[Row]) -> Markup:
     """Return medians per step and what follows from them, a table per set of steps."""
-    sets: dict[tuple[float, ...], list[Staircase]] = {}
-    for one in stairs:
-        sets.setdefault(tuple(one.commands_m), []).append(one)
 
-    def step(index: int, command: float) -> Column:
-        return Column(f"{command:.2f} m", lambda row: millimetres(row.median_apexes_m[index]))
+    def step(number: int, command: float) -> Column:
+        return Column(f"{command:.2f} m", lambda row: millimetres(row["median_apexes_m"][number]))
 
     last = (
-        Column("monotone", lambda r: "yes" if r.monotone else "no", lambda r: not r.monotone),
-        Column("runs monotone", lambda r: f"{r.monotone_runs} of {r.runs}"),
+        Column("monotone", lambda r: "yes" if r["monotone"] else "no", lambda r: not r["monotone"]),
+        Column("runs monotone", lambda r: f"{r['monotone_runs']} of {r['runs']}"),
         _SKIPPED,
     )
     return Markup("").join(
         table(
             (_CONTROLLER, *itertools.starmap(step, enumerate(steps)), *last),
-            rows,
+            list(rows),
             "median apex at each step / mm",
         )
-        for steps, rows in sets.items()
+        for steps, rows in itertools.groupby(stairs, lambda row: row["commands_m"])
     )
 
 
-def estimator_table(estimators: Sequence[Estimator]) -> Markup:
-    """Return bias and spread of estimated minus true height."""
+def verdict(evaluation: Evaluation, controller: str) -> str:
+    """Return in a sentence how near it hops to its commands, what it skips, touches and heats.
 
-    def pair(heading: str, name: str) -> Column:
-        bias = column("", f"{name}_bias_m", "+z.1f", 1e3)
-        std = column("", f"{name}_std_m", ".1f", 1e3)
-        return Column(heading, lambda row: f"{bias.text(row)} ± {std.text(row)}")
+    Heights between and beyond the commands count, too.
+    """
+    own = evaluation.rows(controller)
+    rows = own + [row for row in evaluation.ladder if row.controller == controller]
+    errors = {row: abs(row.median_error_m) for row in rows if row.hops}
+    if not errors:
+        return "does not hop at any height."
+    worst = max(errors, key=errors.__getitem__)
+    parts = [
+        f"misses its command by {_mm(median(errors.values()))} in the median of"
+        f" {len({row.command_m for row in rows})} heights and by {_mm(errors[worst])} at the worst,"
+        f" {worst.command_m:.2f} m"
+    ]
+    if still := sorted({row.command_m for row in rows} - {row.command_m for row in errors}):
+        parts.append(f"does not hop at {', '.join(f'{command:.2f}' for command in still)} m")
+    parts += [_skipped(rows), _contacts(sum(row.body_contacts for row in rows))]
+    for stair in evaluation.staircase:
+        if stair.controller == controller:
+            rises = "rises" if stair.monotone else "does not rise"
+            parts.append(f"{rises} at every step of the staircase")
+    if (share := max(row.rated_torque_share for row in own)) > 1:
+        minutes = min(row.thermal_minutes for row in own)
+        parts.append(f"its motors give {share:.0%} of their rated torque, for {minutes:.0f} min")
+    other = evaluation.secondary
+    if other is not None and (there := [r for r in other.rows(controller) if r.hops]):
+        most = max(abs(row.median_error_m) for row in there)
+        parts.append(f"on the {other.conditions['floor']} floor misses by {_mm(most)} at the worst")
+    return f"{'; '.join(parts)}."
 
-    columns = (
-        _CONTROLLER,
-        pair("in flight / mm", "flight"),
-        pair("in stance / mm", "stance"),
-        pair("apex, after landing / mm", "apex"),
-        _HOPS,
-    )
-    return table(columns, estimators, "estimated minus true, mean ± standard deviation")
+
+def _skipped(rows: Sequence[Summary]) -> str:
+    skipped, hops = (sum(getattr(r, name) for r in rows) for name in ("skipped_hops", "hops"))
+    return f"skips {skipped} of {skipped + hops} hops" if skipped else "skips no hop"
+
+
+def _contacts(count: int) -> str:
+    times = "once" if count == 1 else f"{count} times"
+    return f"base or knee touch the ground {times}" if count else "only the foot touches the ground"
+
+
+def _mm(metres: float) -> str:
+    return f"{1e3 * metres:.1f} mm"
 
 
 def print_evaluation(console: Console, evaluation: Evaluation) -> None:
-    """Print notes, the summary, and what it was measured on."""
+    """Print notes, the summary and a verdict on every controller."""
     _print_notes(console, evaluation.notes)
     for one in filter(None, (evaluation, evaluation.secondary)):
         c = one.conditions
-        title = (
-            f"{c['robot']}, {c['floor']} floor, {c['seeds']} seed{'' if c['seeds'] == 1 else 's'}"
-            f" from {c['seed']}; heights in mm"
-        )
-        caption = (
-            "error: median of apex - command; skip: skipped hops; 1/s: hop rate;\n"
-            "base: lowest height over whole runs; contacts: of base or knee with the ground;\n"
-            "out: time with a joint outside its soft limits"
-        )
-        print_table(_text_table(_SHORT, one.summary, title, caption), console)
-    lines = [
-        f"Staircase, {step.controller}: {'rises' if step.monotone else 'does not rise'} at every"
-        f" step ({step.monotone_runs} of {step.runs} runs on their own), {step.skipped_hops}"
-        " skipped hops."
-        for step in evaluation.staircase
-    ]
-    own = [evaluation.rows(name) for name in evaluation.controllers]
-    lines += [_load_line(rows) for rows in own if math.isfinite(rows[0].rated_torque_share)]
-    for line in lines:
-        console.print(line, highlight=False)
+        title = f"On {c['robot']}, {c['floor']} floor, {c['seeds']} seeds from {c['seed']}:"
+        _print_table(console, title, SHORT, one.to_json()["summary"])
+    for name in evaluation.controllers:
+        console.print(f"{name} {verdict(evaluation, name)}", highlight=False)
 
 
 def _print_notes(console: Console, notes: Sequence[str]) -> None:
@@ -236,55 +244,37 @@ def _print_notes(console: Console, notes: Sequence[str]) -> None:
         console.print(f"Note: {note}", highlight=False)
 
 
-def _load_line(rows: Sequence[Summary]) -> str:
-    """Return what a controller asks of the motors at worst, of all its commands."""
-    share, minutes = (max(r.rated_torque_share for r in rows), min(r.thermal_minutes for r in rows))
-    limited = f"limited after {minutes:.1f} min" if share > 1 else "never limited by heat"
-    return (
-        f"Motors, {rows[0].controller}: RMS torque {100 * share:.0f} % of the rated ({limited}),"
-        f" {max(r.mean_electrical_power_w for r in rows):.0f} W from the bus, up to"
-        f" {max(r.peak_regeneration_w for r in rows):.0f} W back"
-        f" (+{max(r.bus_voltage_rise_v for r in rows):.2f} V),"
-        f" {max(r.torque_reversals_hz for r in rows):.0f} torque reversals per s."
-    )
-
-
-def print_robustness(console: Console, result: dict[str, Any]) -> None:
+def print_robustness(console: Console, result: Row) -> None:
     """Print notes and the scores on every axis."""
     _print_notes(console, result["notes"])
-    c = result["conditions"]
-    marked = {axis["name"]: bool(axis["leaderboard"]) for axis in result["axes"]}
-    scores = {(row["controller"], row["axis"]): _score(row) for row in result["scores"]}
-    axes = list(dict.fromkeys(axis for _, axis in scores))
+    c, scores = result["conditions"], {(r["axis"], r["controller"]): r for r in result["scores"]}
 
     def score(controller: str) -> Column:
-        return Column(controller, lambda axis: scores[controller, axis])
+        def text(axis: str) -> str:
+            row = scores[axis, controller]
+            return f"{row['score']:.0%} [{row['low']:.0%}, {row['high']:.0%}]".replace("%", "")
 
-    columns = [Column("axis", str), Column("R", lambda axis: "x" if marked.get(axis) else "")]
-    columns += map(score, dict.fromkeys(name for name, _ in scores))
-    title = f"Robustness, {c['robot']}: successful trials in %"
-    caption = (
-        f"{', '.join(f'{command:g}' for command in c['commands_m'])} m, {c['seeds']} seeds from"
-        f" {c['seed']}; in brackets the 95 % interval;\nR: on RealAIGym's leaderboard, too"
+        return Column(controller, text)
+
+    columns = [Column("axis", str), *map(score, dict.fromkeys(name for _, name in scores))]
+    title = (
+        f"Robustness on {c['robot']}: successful trials in % and their 95 % interval;"
+        f" {', '.join(f'{command:g}' for command in c['commands_m'])} m,"
+        f" {c['seeds']} seeds from {c['seed']}."
     )
-    print_table(_text_table(columns, axes, title, caption), console)
+    axes = list(dict.fromkeys(axis for axis, _ in scores))
+    _print_table(console, title, columns, axes)
 
 
-def _score(row: dict[str, Any]) -> str:
-    score = f"{100 * row['score']:.0f}"
-    if not math.isfinite(row["low"]):
-        return score
-    return f"{score} [{100 * row['low']:.0f}, {100 * row['high']:.0f}]"
-
-
-def _text_table(
-    columns: Sequence[Column], rows: Sequence[Any], title: str, caption: str | None = None
-) -> Table:
-    """Return a table for the terminal, within 80 columns where names allow."""
-    shown = Table(title=title, caption=caption, box=box.SIMPLE_HEAD, padding=0)
+def _print_table(
+    console: Console, title: str, columns: Sequence[Column], rows: Sequence[Any]
+) -> None:
+    """Print a table under a sentence, within 80 columns where names allow."""
+    console.print(title, highlight=False)
+    shown = Table(box=box.SIMPLE_HEAD, padding=0)
     shown.add_column(columns[0].heading, min_width=14)
     for column in columns[1:]:
-        shown.add_column(column.heading, justify="right")
+        shown.add_column(textwrap.fill(column.heading, _NARROW), justify="right")
     for row in rows:
         shown.add_row(*(column.text(row) for column in columns))
-    return shown
+    print_table(shown, console)
