@@ -1,15 +1,13 @@
-"""Run the paper's sim-to-real experiment on twins: record, identify, train, hop; or foretell.
+"""Run the paper's sim-to-real experiment on twins: record, identify, train, hop.
 
 A twin plays the real leg: it differs from the CAD in what a fit can find and in what no fit knows.
 `transfer` records and identifies it, trains a policy on what was identified and lets it hop on the
-twin without tuning. `prediction` leaves trainings out: the simulations foretell how high shipped
-controllers hop on the twins. In `zero-shot` controllers hop on legs that they have never met. What
-is done stays in a folder: the same command goes on after an interruption, and more twins, methods
-or seeds add to what is there.
+twin without tuning. In `zero-shot` controllers hop on legs that they have never met. What is done
+stays in a folder: the same command goes on after an interruption, and more twins, methods or seeds
+add to what is there.
 
 Examples:
   python -m studies.sim_to_real transfer --json transfer.json
-  python -m studies.sim_to_real prediction --json prediction.json
   python -m studies.sim_to_real transfer --twins 10 --seeds 0 1 2 --jobs 8
   python -m studies.sim_to_real zero-shot --controllers universal energy-shaping --twins 100
 """
@@ -37,6 +35,4 @@ RESULTS = (
     "python -m studies.sim_to_real transfer --methods identified identified-posterior "
     "energy-shaping --twins 10 --jobs 2 --folder runs/transfer-fast --json "
     "studies/sim_to_real/results/posterior.json",
-    "python -m studies.sim_to_real prediction --twins 5 --jobs 2 --json "
-    "studies/sim_to_real/results/prediction.json",
 )

@@ -2,12 +2,9 @@
 
 import hashlib
 import json
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from hopping_leg.cli.options import Heights, JsonFile, at_least
 from hopping_leg.controllers.energy_shaping.gains import load_gains
@@ -15,15 +12,11 @@ from hopping_leg.controllers.registry import ENERGY_SHAPING
 from hopping_leg.evaluate import entries, runner
 from hopping_leg.evaluate.statistics import LEAST_TWINS
 from hopping_leg.rl.recipes import get_recipe, randomise
-from hopping_leg.robot import Robot, load_robot
+from hopping_leg.robot import load_robot
 from studies.shared import Row, do_all
 from studies.sim_to_real import steps
-from studies.sim_to_real.methods import Method, choose_methods
+from studies.sim_to_real.methods import DEFAULT, Method, choose_methods
 from studies.sim_to_real.twins import Twin, disturbance_of, find_twins, simulated
-
-HOPPERS = ("fast", ENERGY_SHAPING)
-"""What hops are foretold of: a policy, which no hop corrects, so that its apexes tell most of the
-leg, and energy shaping, which no simulation has trained."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +26,11 @@ class Experiment:
     twins: tuple[str, ...] = (str(LEAST_TWINS),)
     """How many twins to draw, or robot files that extend what is believed of them; intervals over
     twins need 20."""
-    methods: tuple[str, ...] | None = None
-    """What policies are trained on, the others being compared with the first; or what foretells.
-    Valid: identified, cad, table-1, rail-only, fixed-base-only, two-pass, one-pass, truth; not to
-    foretell, as each leg in training differs, identified-posterior, randomised; and, not trained,
-    energy-shaping, energy-shaping-tuned, universal, universal-identified.
-    Default: identified, cad, table-1, randomised and energy-shaping; or all that can foretell."""
+    methods: tuple[str, ...] = DEFAULT
+    """What policies are trained on, the others being compared with the first. Valid: identified,
+    cad, table-1, rail-only, fixed-base-only, two-pass, one-pass, truth; those whose legs differ in
+    training, identified-posterior and randomised; and, not trained, energy-shaping,
+    energy-shaping-tuned, universal, universal-identified."""
     seeds: tuple[int, ...] = (0,)
     """Seeds of the trainings, one of each method and twin each."""
     recipe: str = "fast"
@@ -68,12 +60,12 @@ class Chain:
         RobotError: There is no such twin.
     """
 
-    def __init__(self, asked: Experiment, methods: Iterable[str]) -> None:
+    def __init__(self, asked: Experiment) -> None:
         at_least(1, jobs=asked.jobs, steps=asked.steps, generations=asked.generations)
         at_least(1, repeats=asked.repeats, seeds=len(asked.seeds))
         at_least(30, seconds=round(asked.seconds))
         get_recipe(asked.recipe)
-        self.asked, self.methods = asked, choose_methods(tuple(methods))
+        self.asked, self.methods = asked, choose_methods(asked.methods)
         self.twins = find_twins(asked.twins, asked.folder / "twins")
 
     def about(self) -> Row:
@@ -182,7 +174,7 @@ class Chain:
 
     def hop(self) -> list[Row]:
         """Let all policies hop on the twins; return a record per policy, twin and command."""
-        runs = self._runs()
+        runs, commands, repeats = self._runs(), self.asked.commands, self.asked.repeats
         jobs = []
         for twin, method, seed in runs:
             controller: str | Path = method.untrained
@@ -191,55 +183,19 @@ class Chain:
             elif not method.untrained:
                 controller = self._training(twin, method, seed)[-1] / "policy.onnx"
             told = self.source(twin, method) if method.untrained else twin.believed
-            name = f"trials/{twin.name}-{method.name}-seed{seed}.json"
-            jobs.append(self._trial(name, controller, told, twin.robot))
+            file = self._file("trials", f"{twin.name}-{method.name}-seed{seed}.json")
+            asked = {
+                "policy": entries.fingerprint(steps.load(controller, told)),
+                "twin": twin.robot.digest,
+                "commands": commands,
+                "repeats": repeats,
+            }
+            jobs.append((file, asked, steps.hop, controller, told, twin, commands, repeats))
         return [
             {"method": method.name, "twin": twin.name, "seed": seed, **row}
             for (twin, method, seed), tried in zip(runs, do_all(jobs, self.asked.jobs), strict=True)
             for row in tried["rows"]
         ]
-
-    def foretell(self) -> list[Row]:
-        """Let the shipped controllers hop on the twins and in the methods' simulations of them.
-
-        Returns:
-            A record per controller, method and twin: ``errors_m`` are predicted minus measured
-            median apexes by command.
-        """
-        places = [
-            (twin, hopper, method, simulated(self.source(twin, method)) if method else twin.robot)
-            for hopper in HOPPERS
-            for twin in self.twins
-            for method in (None, *self.methods)
-        ]
-        jobs = []
-        for twin, hopper, method, leg in places:
-            end = f"-{method.name}" if method else ""
-            name = f"predictions/{twin.name}-{hopper}{end}.json"
-            jobs.append(self._trial(name, hopper, twin.believed, leg))
-        found, true = [], np.empty(0)
-        for (twin, hopper, method, _), tried in zip(
-            places, do_all(jobs, self.asked.jobs), strict=True
-        ):
-            apexes = np.array([row["command_m"] + row["median_error_m"] for row in tried["rows"]])
-            if method is None:
-                true = apexes
-                continue
-            errors = (apexes - true).tolist()
-            found.append(
-                {"controller": hopper, "method": method.name, "twin": twin.name, "errors_m": errors}
-            )
-        return found
-
-    def _trial(self, name: str, controller: str | Path, told: str, leg: Robot) -> tuple[Any, ...]:
-        asked = {
-            "policy": entries.fingerprint(steps.load(controller, told)),
-            "twin": leg.digest,
-            "commands": self.asked.commands,
-            "repeats": self.asked.repeats,
-        }
-        return (self.asked.folder / name, asked, steps.try_out, controller, told, leg,
-                self.asked.commands, self.asked.repeats)  # fmt: skip
 
     def _file(self, kind: str, name: str) -> Path:
         return self.asked.folder / kind / name

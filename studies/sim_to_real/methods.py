@@ -57,11 +57,6 @@ class Method:
     untrained: str = ""
     tuned: bool = False
 
-    @property
-    def simulates(self) -> bool:
-        """Whether it believes in one leg, whose hops can be foretold."""
-        return self.ranges == "none" and not self.untrained
-
 
 METHODS = {
     method.name: method
@@ -107,12 +102,9 @@ METHODS = {
 DEFAULT = ("identified", "cad", "table-1", "randomised", ENERGY_SHAPING)
 """What policies are trained on, and what they hop beside, unless asked otherwise."""
 
-FORETOLD = tuple(name for name, method in METHODS.items() if method.simulates)
-"""Whose predictions are compared unless asked otherwise, ablations of identification among them."""
-
 
 def choose_methods(names: Sequence[str]) -> tuple[Method, ...]:
-    """Return methods by name, each once.
+    """Return methods by name, each once, energy shaping among them.
 
     Raises:
         UsageError: There is no such method, or none is named.
@@ -122,4 +114,4 @@ def choose_methods(names: Sequence[str]) -> tuple[Method, ...]:
             raise UsageError(unknown_name("method", name, METHODS))
     if not names:
         raise UsageError(f"No method is left; name some of: {', '.join(METHODS)}.")
-    return tuple(METHODS[name] for name in dict.fromkeys(names))
+    return tuple(METHODS[name] for name in dict.fromkeys((*names, ENERGY_SHAPING)))

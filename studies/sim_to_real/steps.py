@@ -9,7 +9,6 @@ from hopping_leg.controllers import Controller, RolloutConfig
 from hopping_leg.controllers.command_schedule import command_range
 from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller
 from hopping_leg.evaluate import entries, runner
-from hopping_leg.evaluate.motor_load import MotorLoad
 from hopping_leg.identify import cost, excitation, optimizers, plan, play_excitation
 from hopping_leg.identify.paper_excitation import Strokes, adapt, fixed_base, moving_base
 from hopping_leg.identify.parameters import LegHypothesis
@@ -185,8 +184,7 @@ class WithinRange:
 
 
 _KEPT = ("command_m", "median_error_m", "median_abs_error_m", "std_m", "hops", "skipped_hops",
-         "missed_runs", "hop_rate_hz", "flight_fraction", "body_contacts",
-         *MotorLoad.__dataclass_fields__)  # fmt: skip
+         "missed_runs", "hop_rate_hz", "flight_fraction", "body_contacts")  # fmt: skip
 
 
 def load(controller: str | Path, told: str) -> Controller:
@@ -194,7 +192,16 @@ def load(controller: str | Path, told: str) -> Controller:
     return load_controller(controller, load_robot(told), other="accept")
 
 
-def hop(controller: Controller, leg: Robot, commands: Sequence[float], repeats: int) -> list[Row]:
+def hop(
+    controller: str | Path, told: str, twin: Twin, commands: Sequence[float], repeats: int
+) -> Row:
+    """Let a controller that is told a robot hop on a twin; return ``rows`` as ``hops_of`` does."""
+    return {"rows": hops_of(load(controller, told), twin.robot, commands, repeats)}
+
+
+def hops_of(
+    controller: Controller, leg: Robot, commands: Sequence[float], repeats: int
+) -> list[Row]:
     """Let a controller hop on a leg, ``repeats`` runs of 15 s at each command, a record each.
 
     Errors are apex minus command. A leg that never leaves the ground at a command counts as
@@ -211,10 +218,3 @@ def hop(controller: Controller, leg: Robot, commands: Sequence[float], repeats: 
     )
     summary = judged.evaluation.to_json()["summary"]
     return [{**{n: row[n] for n in _KEPT}, "motionless": not row["hops"]} for row in summary]
-
-
-def try_out(
-    controller: str | Path, told: str, leg: Robot, commands: Sequence[float], repeats: int
-) -> Row:
-    """Return ``hop``'s records of a controller that is told a robot."""
-    return {"rows": hop(load(controller, told), leg, commands, repeats)}

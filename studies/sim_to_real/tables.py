@@ -13,8 +13,6 @@ from studies.shared import Row
 _BOOTSTRAP_SEED = 0
 _ERROR = "median_abs_error_m"
 _SUMS = ("hops", "skipped_hops", "missed_runs", "body_contacts", "motionless")
-_LOADS = ("outside_limits_fraction", "soft_limit_share", "rated_torque_share",
-          "mean_electrical_power_w", "peak_regeneration_w", "torque_reversals_hz")  # fmt: skip
 
 
 def tabulate(meanings: Mapping[str, str], trials: Sequence[Row]) -> Row:
@@ -65,7 +63,7 @@ def median_over_twins(trials: Sequence[Row], name: str) -> Row:
 
 
 def compare(first: str, other: str, trials: Sequence[Row]) -> Row:
-    """Return the ratio of two methods' errors, overall and at the command where it is smallest.
+    """Return the ratio of two methods' errors.
 
     The medians are over all trials; the interval resamples whole twins, so that both methods keep
     meeting the same ones; it is NaN with fewer than ``LEAST_TWINS``.
@@ -79,16 +77,12 @@ def compare(first: str, other: str, trials: Sequence[Row]) -> Row:
         return float(over / under)
 
     low, high = statistics.bootstrap(range(count), ratio, _BOOTSTRAP_SEED, statistics.LEAST_TWINS)
-    at_first = _errors_at_commands(below)
     return {
         "method": other,
         "over": first,
         "ratio": ratio(range(count)),
         "ratio_low": float(low),
         "ratio_high": float(high),
-        "least_ratio_of_a_command": min(
-            error / at_first[command] for command, error in _errors_at_commands(above).items()
-        ),
     }
 
 
@@ -106,9 +100,7 @@ def _pooled(name: str, meaning: str, trials: Sequence[Row]) -> Row:
 def _whole(name: str, meaning: str, trials: Sequence[Row]) -> Row:
     return {
         **_pooled(name, meaning, trials),
-        "worst_command_median_abs_error_m": max(_errors_at_commands(trials).values()),
         "ordered": sum(map(_ordered, _runs(trials))),
-        **{key: float(np.median([row[key] for row in trials])) for key in _LOADS},
     }
 
 
@@ -123,11 +115,6 @@ def _ordered(run: Sequence[Row]) -> bool:
 def _runs(trials: Sequence[Row]) -> list[list[Row]]:
     """Return the trials of each policy on each twin."""
     return [run for twin in _by("twin", trials).values() for run in _by("seed", twin).values()]
-
-
-def _errors_at_commands(trials: Sequence[Row]) -> dict[float, float]:
-    groups = _by("command_m", trials).items()
-    return {command: float(np.median([r[_ERROR] for r in rows])) for command, rows in groups}
 
 
 def _of_twins(trials: Sequence[Row], name: str) -> list[Array]:
