@@ -13,9 +13,7 @@ PAGES = {
 }
 
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-_NO_PROSE = re.compile(
-    r"<!-- render.*?<!-- /render -->|^```.*?^```$|\{\{.*?\}\}|\{%.*?%\}", re.DOTALL | re.MULTILINE
-)
+_NO_PROSE = re.compile(r"<!-- render.*?<!-- /render -->|^```.*?^```$", re.DOTALL | re.MULTILINE)
 _EXAMPLE = "<!-- render: example("
 _INLINE = re.compile(r"(?<!`)`(hop [^`]+)`(?!`)")
 _INDENTED = re.compile(r"^ {4,}(hop|python|make|pip) .*$", re.MULTILINE)
@@ -63,7 +61,8 @@ def prose(page: str) -> list[str]:
 
 def inline_commands(page: str) -> list[list[str]]:
     """Return what stands in running text as `hop ...`; files and values may be left open there."""
-    return [words.split() for words in _INLINE.findall(PAGES[page].read_text(encoding="utf-8"))]
+    text = _NO_PROSE.sub("", PAGES[page].read_text(encoding="utf-8"))
+    return [words.split() for words in _INLINE.findall(text)]
 
 
 def indented_commands(page: str) -> list[str]:

@@ -65,12 +65,9 @@ INTERRUPTED = dict.fromkeys(
 REFUSED = {"hop doctor --transport /dev/fdcanusb --robot my_leg.toml --home 0.0 0.0": cli.FAILED}
 """Commands that do their work and then refuse, as their page says: a straight leg is not armed."""
 
-BEFORE = {
-    "own-controller": "class TheirController:\n    def __init__(self, mass, dt): pass",
-}
+BEFORE = {"own-controller": "class TheirController:\n    def __init__(self, mass, dt): pass"}
 """Python that a page takes for granted."""
 
-TRIAL = "runs/deploy/Bouncer-20260101-120000.parquet"
 KILLED = "runs/deploy/fast-20260501-101500.blackbox"
 
 
@@ -101,11 +98,9 @@ def furnish(page: str) -> None:
     Path("runs/deploy").mkdir(parents=True)
     make = {
         "deploy": _wired_leg_and_killed_run,
-        "first-controller": _first_controller,
-        "evaluation": _stored_runs,
-        "other-tools": _bag_and_policy,
-        "own-controller": lambda: _trial().save(Path(TRIAL)),
-        "robustness": _trained_policy,
+        "evaluation": _trained_policy,
+        "other-tools": _bag_trial_and_policy,
+        "own-controller": _first_controller,
         "transfer": lambda: draw_twin(0).save(Path("my_twin.toml")),
         "viewer": _trial_and_killed_run,
     }
@@ -114,7 +109,7 @@ def furnish(page: str) -> None:
 
 def _first_controller() -> None:
     """Write what the page lets the reader write."""
-    code = [b.text for b in blocks("first-controller") if b.language == "python"]
+    code = [b.text for b in blocks("own-controller") if b.language == "python"][:3]
     Path("first.py").write_text("\n\n".join(code))
 
 
@@ -123,8 +118,8 @@ def _trained_policy() -> None:
     shutil.copy(ROOT / "src/hopping_leg/policies/fast.onnx", "runs/mine/policy.onnx")
 
 
-def _bag_and_policy() -> None:
-    """Leave what is not made here: a recording as a bag, and a policy."""
+def _bag_trial_and_policy() -> None:
+    """Leave what is not made here: a trial, a recording as a bag, and a policy."""
     from hopping_leg.formats.mcap_writer import to_mcap
     from hopping_leg.identify.excitation import Multisine, make_excitation
     from hopping_leg.identify.play_excitation import play
@@ -134,6 +129,7 @@ def _bag_and_policy() -> None:
     recording.save(Path("bag.parquet"))
     Path("bag.mcap").write_bytes(to_mcap(Trace.load(Path("bag.parquet"))))
     Path("bag.parquet").unlink()
+    _trial().save(Path("run.parquet"))
     _trained_policy()
 
 
@@ -172,10 +168,3 @@ def _killed_run() -> None:
     for row in table.iter_rows():
         box.row(row)
     box.close()
-
-
-def _stored_runs() -> None:
-    short = "--commands 0.3 --seeds 1 --floor soft --no-video --out"
-    for name in ("first", "second"):
-        words = ["evaluate", "energy-shaping", *short.split(), f"runs/{name}"]
-        assert cli.main(words) == 0

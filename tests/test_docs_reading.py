@@ -10,7 +10,7 @@ LONGEST_PAGE = 1500
 LONGEST_SENTENCE = 35
 """Words."""
 
-FIRST = ("README", "index", "first-controller", "quickstart", "your-own-leg")
+FIRST = ("README", "index", "own-controller")
 _WORD = re.compile(r"\w[\w'’-]*")
 
 

@@ -29,8 +29,8 @@ def live():
     """The module that builds the page."""
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(DOCS))
-        yield importlib.import_module("macros_live")
-    sys.modules.pop("macros_live", None)
+        yield importlib.import_module("live_page")
+    sys.modules.pop("live_page", None)
 
 
 @pytest.fixture(scope="module")

@@ -37,7 +37,7 @@ def _run(path: Path) -> str:
     file = f"`examples/notebooks/{path.name}`"
     parts = [part for cell in notebook.cells for part in _cell(cell)]
     parts.insert(1, f"This page is {file}, as it ran when the documentation was built.")
-    return "{% raw %}\n" + "\n\n".join(parts) + "\n{% endraw %}\n"
+    return "\n\n".join(parts) + "\n"
 
 
 def _cell(cell: Any) -> list[str]:  # noqa: ANN401
