@@ -117,7 +117,7 @@ def trace_columns() -> str:
 
 def robustness_axes() -> str:
     """Return the axes of the robustness benchmark as a table."""
-    from hopping_leg.evaluate.robustness.axes import AXES
+    from hopping_leg.evaluate.robustness_axes import AXES
 
     rows = []
     for axis in AXES:

@@ -21,9 +21,9 @@ CEILINGS = {
     "src/hopping_leg/sim/**/*.py": (13, 2520),
     "src/hopping_leg/viewer/**/*.py": (9, 1510),
     "src/**/*.py": (202, 32210),
-    "tests/**/*.py": (147, 17430),
+    "tests/**/*.py": (147, 17420),
     "studies/**/*.py": (83, 8560),
-    "docs/**/*.md": (36, 3290),
+    "docs/**/*.md": (22, 2710),
     "docs/live/*.js": (13, 1490),
 }
 """Files and lines at most. Who raises one says what users gain by it."""
