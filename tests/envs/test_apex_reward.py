@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.envs import ApexRewardConfig, apex_reward
+from hopping_leg.envs.apex_reward import GRAVITY, TOUCH
 from hopping_leg.robot import load_robot
 from tests.envs.transitions import transition
 
@@ -59,7 +60,7 @@ def test_error_costs_alike_above_and_below_and_more_as_training_goes_on(reward):
 
 
 def test_prediction_is_the_ballistic_apex(reward):
-    rate = np.sqrt(2 * CONFIG.effective_gravity * 0.1)
+    rate = np.sqrt(2 * GRAVITY * 0.1)
     assert term(reward, "predicted", 0.2, rate) > term(reward, "predicted", 0.15, rate)
     assert term(reward, "predicted", 0.2, rate, clearance=0.0) == 0.0
 
@@ -86,4 +87,4 @@ def test_the_energy_gain_can_end_where_the_hop_would_be_too_high():
 def test_coming_close_to_the_ground_costs(reward):
     assert term(reward, "clearance", 0.2, 0.0) == 0.0
     near, touching = (term(reward, "clearance", height, 0.0) for height in (0.15, 0.13))
-    assert 0.0 < near < 1.0 < CONFIG.touch < touching
+    assert 0.0 < near < 1.0 < TOUCH < touching

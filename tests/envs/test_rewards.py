@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hopping_leg.envs import (
     HoppingEnv,
     HoppingTask,
+    LastingTerm,
     PaperRewardConfig,
     Reward,
     RewardTerm,
@@ -27,7 +28,7 @@ def squared_action(transition):
     return np.sum(np.square(transition.action), axis=1)
 
 
-class Patience:
+class Patience(LastingTerm):
     """Counts the ticks of an episode."""
 
     def __init__(self):

@@ -3,7 +3,7 @@
 from hopping_leg.envs.apex_reward import ApexRewardConfig, apex_reward
 from hopping_leg.envs.gymnasium_envs import HoppingEnv, HoppingVectorEnv
 from hopping_leg.envs.paper_reward import PaperRewardConfig, paper_reward
-from hopping_leg.envs.rewards import PerLeg, Reward, RewardTerm, Transition
+from hopping_leg.envs.rewards import LastingTerm, Reward, RewardTerm, Transition
 from hopping_leg.envs.task import HoppingTask, Step, TaskLeg
 from hopping_leg.envs.task_config import TaskConfig
 
@@ -12,8 +12,8 @@ __all__ = [
     "HoppingEnv",
     "HoppingTask",
     "HoppingVectorEnv",
+    "LastingTerm",
     "PaperRewardConfig",
-    "PerLeg",
     "Reward",
     "RewardTerm",
     "Step",

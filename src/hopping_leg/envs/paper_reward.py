@@ -1,15 +1,14 @@
 """The paper's reward (Sec. II-C, "Reward"): R = w1 Ge - w2 Ph - w3 Pj - w4 Pjp - w5 Pjv."""
 
-import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.envs.rewards import PerLeg, Reward, RewardTerm
+from hopping_leg.envs.rewards import Reward, RewardTerm, Transition, sum_of_joints
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim.compiled import compiled
 
 Barrier = Literal["step", "printed"]
 
@@ -43,15 +42,16 @@ def paper_reward(robot: Robot, config: PaperRewardConfig = PaperRewardConfig()) 
     c, limit = config, config.velocity_limit
     speed = robot.of_joints("no_load_speed") if limit is None else np.full(2, limit)
     rest, printed = c.rest_length + robot.foot.radius, c.barrier == "printed"
+    limits = position_limits(robot)
     return Reward(
         (
-            RewardTerm("energy", c.energy, PerLeg(energy_gain, rest)),
-            RewardTerm("height", -c.height, PerLeg(height_barrier, printed)),
-            RewardTerm("jerk", -c.jerk, PerLeg(action_jerk)),
+            RewardTerm("energy", c.energy, partial(energy_gain, rest=rest)),
+            RewardTerm("height", -c.height, partial(height_barrier, printed=printed)),
+            RewardTerm("jerk", -c.jerk, action_jerk),
+            RewardTerm("position", -c.position, partial(joint_position_penalty, limits=limits)),
             RewardTerm(
-                "position", -c.position, PerLeg(joint_position_penalty, position_limits(robot))
+                "velocity", -c.velocity, partial(joint_velocity_penalty, limit_squared=speed**2)
             ),
-            RewardTerm("velocity", -c.velocity, PerLeg(joint_velocity_penalty, speed)),
         )
     )
 
@@ -61,76 +61,31 @@ def position_limits(robot: Robot) -> Array:
     return np.stack([robot.of_joints("lower"), robot.of_joints("upper")])
 
 
-@compiled
-def energy_gain(
-    state: Array, command: Array, action: Array, last: Array, rest: float, terms: Array, column: int
-) -> None:
-    """Set Ge: base velocity and height above its rest, both squared, m2/s2 + m2."""
-    for leg in range(len(terms)):
-        offset, rate = state[leg, 0] - rest, state[leg, 3]
-        terms[leg, column] = rate * rate + offset * offset
+def energy_gain(t: Transition, rest: float) -> Array:
+    """Return Ge: base velocity and height above its rest, m, both squared, m2/s2 + m2."""
+    return np.square(t.rate) + np.square(t.height - rest)
 
 
-@compiled
-def height_barrier(
-    state: Array,
-    command: Array,
-    action: Array,
-    last: Array,
-    printed: bool,
-    terms: Array,
-    column: int,
-) -> None:
-    """Set Ph: grows with the base's height above the desired one, 0 below."""
-    for leg in range(len(terms)):
-        excess = state[leg, 0] - command[leg]
-        growth = math.exp(excess) if excess >= 0 else 0.0
-        terms[leg, column] = 1 - growth if printed and excess >= 0 else growth
+def height_barrier(t: Transition, printed: bool) -> Array:
+    """Return Ph: grows with the base's height above the desired one, 0 below."""
+    excess = t.height - t.command
+    growth = np.exp(excess)
+    return np.where(excess >= 0, 1 - growth if printed else growth, 0.0)
 
 
-@compiled
-def action_jerk(
-    state: Array, command: Array, action: Array, last: Array, terms: Array, column: int
-) -> None:
-    """Set Pj: the squared change of the action."""
-    for leg in range(len(terms)):
-        hip, knee = action[leg, 0] - last[leg, 0], action[leg, 1] - last[leg, 1]
-        terms[leg, column] = hip * hip + knee * knee
+def action_jerk(t: Transition) -> Array:
+    """Return Pj: the squared change of the action."""
+    return sum_of_joints(np.square(t.action - t.last_action))
 
 
-@compiled
-def joint_position_penalty(
-    state: Array,
-    command: Array,
-    action: Array,
-    last: Array,
-    limits: Array,
-    terms: Array,
-    column: int,
-) -> None:
-    """Set Pjp: 1 for each joint beyond its limits, rad, (2, 2), and rising towards it inside."""
-    for leg in range(len(terms)):
-        terms[leg, column] = 0.0
-        for joint in range(2):
-            q = state[leg, 1 + joint]
-            below, above = limits[0, joint] - q, q - limits[1, joint]
-            near = math.exp(_SHARPNESS * below) + math.exp(_SHARPNESS * above)
-            terms[leg, column] += 1.0 if max(below, above) > 0 else near
+def joint_position_penalty(t: Transition, limits: Array) -> Array:
+    """Return Pjp: 1 for each joint beyond its limits, rad, (2, 2), and rising towards it inside."""
+    lower, upper = limits[..., None]
+    below, above = lower - t.q.T, t.q.T - upper  # (2, n): numpy is slow on rows of two
+    near = np.exp(_SHARPNESS * below) + np.exp(_SHARPNESS * above)
+    return sum_of_joints(np.where(np.maximum(below, above) > 0, 1.0, near).T)
 
 
-@compiled
-def joint_velocity_penalty(
-    state: Array,
-    command: Array,
-    action: Array,
-    last: Array,
-    limit: Array,
-    terms: Array,
-    column: int,
-) -> None:
-    """Set Pjv: squared joint velocity less its limit's square, where it is faster, rad2/s2."""
-    for leg in range(len(terms)):
-        terms[leg, column] = 0.0
-        for joint in range(2):
-            qd = state[leg, 4 + joint]
-            terms[leg, column] += max(qd * qd - limit[joint] * limit[joint], 0.0)
+def joint_velocity_penalty(t: Transition, limit_squared: Array) -> Array:
+    """Return Pjv: squared joint velocity less its limit's square, where it is faster, rad2/s2."""
+    return sum_of_joints(np.maximum(np.square(t.qd.T) - limit_squared[:, None], 0.0).T)

@@ -3,13 +3,12 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hopping_leg import errors, hop_detection
 from hopping_leg.arrays import Array, BoolArray, IntArray
-from hopping_leg.sim.compiled import compiled
 
 
 @dataclass
@@ -71,58 +70,28 @@ def sum_of_joints(values: Array) -> Array:
     return total
 
 
-@runtime_checkable
-class StatefulTerm(Protocol):
-    """A term that remembers something from tick to tick."""
+class LastingTerm:
+    """A term that remembers something from tick to tick, or changes while training proceeds.
 
-    def __call__(self, transition: Transition) -> Array:
-        """Return the unweighted term, (n,)."""
-        ...
+    A subclass overrides what it needs.
+    """
+
+    def __call__(self, transition: Transition) -> Array | float:
+        """Return the unweighted term, (n,), or one number for all."""
+        raise NotImplementedError
 
     def restart(self, rows: IntArray) -> None:
         """Forget the past of some legs, whose episodes begin anew; nothing, if never called."""
-        ...
-
-    def state(self) -> dict[str, Any]:
-        """Return what is remembered, as arrays and plain values."""
-        ...
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on from a ``state``."""
-        ...
-
-
-@runtime_checkable
-class AnnealedTerm(Protocol):
-    """A term that changes while training proceeds."""
 
     def anneal(self, share: float) -> None:
         """Adapt to the share of the training that is done, 0 to 1."""
-        ...
 
+    def state(self) -> dict[str, Any]:
+        """Return what is remembered, as arrays and plain values."""
+        return {}
 
-class PerLeg:
-    """A term that a compiled function sets, leg by leg: numpy takes longer for few legs.
-
-    It is called as ``function(state, command, action, last_action, *numbers, terms, column)``.
-    """
-
-    def __init__(self, function: Callable[..., None], *numbers: Array | float) -> None:
-        self._function, self._numbers = function, numbers
-
-    def set(self, t: Transition, terms: Array, column: int) -> None:
-        """Set a column of the terms, (n, k)."""
-        self._function(t.state, t.command, t.action, t.last_action, *self._numbers, terms, column)
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> "PerLeg":
-        """Return itself, which remembers nothing."""
-        return self
-
-    def __call__(self, transition: Transition) -> Array:
-        """Return the unweighted term, (n,)."""
-        terms = np.empty((len(transition.command), 1))
-        self.set(transition, terms, 0)
-        return terms[:, 0]
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a ``state``."""
 
 
 class RewardTerm(NamedTuple):
@@ -132,8 +101,8 @@ class RewardTerm(NamedTuple):
     """Name in ``info["reward_terms"]``."""
     weight: float | Callable[[float], float]
     """Factor of the term, negative for a penalty, or that factor at a share of the training."""
-    function: Callable[[Transition], Array | float] | StatefulTerm
-    """Computes the unweighted term, (n,), or one number for all."""
+    function: Callable[[Transition], Array | float]
+    """Computes the unweighted term, (n,), or one number for all; may be a ``LastingTerm``."""
 
 
 class Reward:
@@ -148,10 +117,7 @@ class Reward:
         self.names = tuple(term.name for term in terms)
         if len(set(self.names)) < len(self.names):
             raise errors.UsageError(f"Terms of a reward need names of their own, not {self.names}.")
-        self._functions = tuple(term.function for term in terms)
-        self._stateful = {
-            term.name: term.function for term in terms if isinstance(term.function, StatefulTerm)
-        }
+        self._lasting = {t.name: t.function for t in terms if isinstance(t.function, LastingTerm)}
         self.anneal(0.0)
 
     def with_terms(self, *terms: RewardTerm) -> "Reward":
@@ -160,43 +126,28 @@ class Reward:
 
     def anneal(self, share: float) -> None:
         """Adapt weights and terms to the share of the training that is done, 0 to 1."""
-        weights = (weight(share) if callable(weight) else weight for _, weight, _ in self.terms)
-        self._weights = np.array(list(weights), np.float64)
-        for function in self._functions:
-            if isinstance(function, AnnealedTerm):
-                function.anneal(share)
+        weights = [weight(share) if callable(weight) else weight for _, weight, _ in self.terms]
+        self._weights = self.scale * np.array(weights, np.float64)
+        for term in self._lasting.values():
+            term.anneal(share)
 
     def __call__(self, transition: Transition) -> tuple[Array, Array]:
         """Return the reward, (n,), and its unweighted terms, (n, k)."""
         terms = np.empty((len(transition.state), len(self.terms)))
-        for column, function in enumerate(self._functions):
-            if isinstance(function, PerLeg):
-                function.set(transition, terms, column)
-            else:
-                terms[:, column] = function(transition)
-        reward = np.empty(len(terms))
-        _weigh(terms, self._weights, self.scale, reward)
-        return reward, terms
+        for column, term in enumerate(self.terms):
+            terms[:, column] = term.function(transition)
+        return np.vecdot(terms, self._weights), terms
 
     def restart(self, rows: IntArray) -> None:
         """Forget the past of some legs, whose episodes begin anew."""
-        for term in self._stateful.values():
+        for term in self._lasting.values():
             term.restart(rows)
 
     def state(self) -> dict[str, Any]:
         """Return what the terms remember from tick to tick, by their names."""
-        return {name: term.state() for name, term in self._stateful.items()}
+        return {name: term.state() for name, term in self._lasting.items()}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a ``state``."""
-        for name, term in self._stateful.items():
+        for name, term in self._lasting.items():
             term.restore(state[name])
-
-
-@compiled
-def _weigh(terms: Array, weights: Array, scale: float, reward: Array) -> None:
-    for leg in range(len(terms)):
-        total = 0.0
-        for k in range(len(weights)):
-            total += weights[k] * terms[leg, k]
-        reward[leg] = scale * total
