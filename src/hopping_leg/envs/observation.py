@@ -9,8 +9,7 @@ scale, the command runs from -1 to 1 over its range.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,25 +23,15 @@ from hopping_leg.sim.compiled import compiled
 SIZE = 15
 """Entries of the paper's observation."""
 
-
-_LEAST_SPAN = 0.05
-"""Half the command range of an observation at least, m, so that a single command has a scale."""
-
-_LATE = 0.025  # age of a sample that an observation shows as 1, s
-
-
 PRIVILEGED = 10
 """Entries of the true state, where all legs are the same."""
 
-PRIVILEGED_HEIGHT, PRIVILEGED_COMMAND, PRIVILEGED_CLEARANCE = 0, 6, 7
-"""Where the base's height, the command and the foot's clearance stand among them."""
-
-CLEARANCE_GAIN = 10.0
-"""Scale of clearances, 1/m."""
+_LEAST_SPAN = 0.05  # half the command range at least, m, so that a single command has a scale
+_LATE = 0.025  # age of a sample that is shown as 1, s
+_CLEARANCE_GAIN = 10.0  # scale of clearances, 1/m
 
 
-@dataclass(frozen=True)
-class Scaling:
+class Scaling(NamedTuple):
     """Normalised value = (value - offset) * gain."""
 
     offset: Array
@@ -56,17 +45,21 @@ class Observation(ABC):
 
     layout: str
     """Name of the observation history that gives a trained policy the same inputs."""
-    size: int
-    """Entries of an observation."""
-    order: IntArray
-    """Where each of the history's joined inputs stands in an observation, (size,)."""
     scaling: Scaling
     """Scaling of the history's joined inputs."""
+    order: IntArray
+    """Where each of these stands in an observation, (size,)."""
+    command_direction: Array
+    """What a command that is lower by a leg's length adds to an observation, (size,)."""
 
-    @property
-    def command_direction(self) -> Array:
-        """What a command that is lower by a leg's length adds to an observation, (size,)."""
-        return np.zeros(self.size)
+    def __init__(self, layout: str, scaling: Scaling, order: IntArray | None = None) -> None:
+        self.layout, self.scaling, self.size = layout, scaling, len(scaling.offset)
+        self.order = np.arange(self.size) if order is None else order
+        self.command_direction = np.zeros(self.size)
+
+    @abstractmethod
+    def view(self, samples: Array) -> Array32:
+        """Return what is seen in this tick, (n, size)."""
 
     def advance(self, samples: Array, channel: Channel, last_action: Array) -> None:  # noqa: B027
         """Update with a tick's samples (q1, q2, qd1, qd2, command), newest first, (n, 3, 5).
@@ -76,10 +69,6 @@ class Observation(ABC):
 
     def restart(self, rows: IntArray, samples: Array, channel: Channel) -> None:  # noqa: B027
         """Forget the past of some legs, which begin anew within this tick."""
-
-    @abstractmethod
-    def view(self, samples: Array) -> Array32:
-        """Return what is seen in this tick, (n, size)."""
 
     def state(self) -> dict[str, Any]:
         """Return what is remembered from tick to tick."""
@@ -92,14 +81,11 @@ class Observation(ABC):
 class PaperObservation(Observation):
     """The paper's three samples; made straight from the channel's, because it is the fast path."""
 
-    layout = observation_history.ThreeSamples.name
-    size = SIZE
-
     def __init__(self, sample: Scaling) -> None:
         place = np.arange(SIZE).reshape(SAMPLES, 5)
-        self.order = np.concatenate([place[:, 0:2].ravel(), place[:, 2:4].ravel(), place[:, 4]])
-        tiled = [np.tile(values, SAMPLES)[self.order] for values in (sample.offset, sample.gain)]
-        self.scaling = Scaling(*tiled)
+        order = np.concatenate([place[:, 0:2].ravel(), place[:, 2:4].ravel(), place[:, 4]])
+        scaling = Scaling(*(np.tile(values, SAMPLES)[order] for values in sample))
+        super().__init__(observation_history.ThreeSamples.name, scaling, order)
         self._sample = sample
 
     def view(self, samples: Array) -> Array32:
@@ -122,52 +108,37 @@ class HistoryObservation(Observation):
 
     def __init__(
         self,
-        layout: observation_history.ObservationHistory,
+        history: observation_history.ObservationHistory,
         scaling: Scaling,
         torque: Array,
         count: int,
     ) -> None:
-        self._layout, self.layout = layout, layout.name
-        self.scaling, self._torque = scaling, torque
-        self.size = len(scaling.offset)
-        self.order, self._count = np.arange(self.size), count
-        layout.reset(count)
-
-    @property
-    def command_direction(self) -> Array:
-        """What a command that is lower by a leg's length adds to an observation, (size,)."""
-        layout = self._layout
-        if not isinstance(layout, observation_history.AnyLeg):
-            return super().command_direction
-        names = layout.network_inputs
-        parts = [
-            np.full(math.prod(layout.shapes[n]), -layout.COMMAND_GAIN if n == "command" else 0.0)
-            for n in names
-        ]
-        return np.concatenate(parts)
+        super().__init__(history.name, scaling)
+        self._history, self._torque, self._count = history, torque, count
+        history.reset(count)
 
     def advance(self, samples: Array, channel: Channel, last_action: Array) -> None:
-        """Update the layout with a new tick."""
-        self._layout.update(channel.measurement(samples), last_action * self._torque)
+        """Update the history with a new tick."""
+        self._history.update(channel.measurement(samples), last_action * self._torque)
 
     def restart(self, rows: IntArray, samples: Array, channel: Channel) -> None:
-        """Let the layout forget the past of some legs."""
-        self._layout.restart(rows, channel.measurement(samples))
+        """Let the history forget the past of some legs."""
+        self._history.restart(rows, channel.measurement(samples))
 
     def view(self, samples: Array) -> Array32:
         """Return the normalised inputs, (n, size)."""
-        inputs = self._layout.inputs()
-        parts = [inputs[name].reshape(self._count, -1) for name in self._layout.network_inputs]
+        inputs = self._history.inputs()
+        parts = [inputs[name].reshape(self._count, -1) for name in self._history.network_inputs]
         joined = np.concatenate(parts, axis=1, dtype=np.float64)
         return ((joined - self.scaling.offset) * self.scaling.gain).astype(np.float32)
 
     def state(self) -> dict[str, Any]:
-        """Return what the layout remembers."""
-        return self._layout.state()
+        """Return what the history remembers."""
+        return self._history.state()
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a ``state``."""
-        self._layout.restore(state)
+        self._history.restore(state)
 
 
 def sample_scaling(robot: Robot, config: TaskConfig) -> Scaling:
@@ -188,14 +159,18 @@ def make_observation(
     sample = sample_scaling(robot, config)
     if config.observation == observation_history.ThreeSamples.name:
         return PaperObservation(sample)
-    layout = observation_history.make_observation_history(config.observation, 1 / config.rate)
-    layout.set_robots(believed or [robot])
-    if isinstance(layout, observation_history.AnyLeg):
-        size = sum(math.prod(layout.shapes[name]) for name in layout.network_inputs)
+    history = observation_history.make_observation_history(config.observation, 1 / config.rate)
+    history.set_robots(believed or [robot])
+    sizes = {name: math.prod(history.shapes[name]) for name in history.network_inputs}
+    if isinstance(history, observation_history.AnyLeg):  # it scales its inputs itself
+        size = sum(sizes.values())
         unit = Scaling(np.zeros(size), np.ones(size))
-        return HistoryObservation(layout, unit, layout.full_torque, count)
+        seen = HistoryObservation(history, unit, history.full_torque, count)
+        names = np.repeat(list(sizes), list(sizes.values()))
+        seen.command_direction[names == "command"] = -history.COMMAND_GAIN
+        return seen
     torque = np.array(config.action_torque)
-    parts = {
+    units = {
         "q": (sample.offset[0:2], sample.gain[0:2]),
         "qd": (sample.offset[2:4], sample.gain[2:4]),
         "age": (np.zeros(1), np.full(1, 1 / _LATE)),
@@ -203,11 +178,11 @@ def make_observation(
         "command": (sample.offset[4:5], sample.gain[4:5]),
     }
     columns = [
-        [np.tile(values, shape[0] if len(shape) > 1 else 1) for values in parts[name]]
-        for name, shape in layout.shapes.items()
+        [np.tile(values, size // len(values)) for values in units[name]]
+        for name, size in sizes.items()
     ]
-    offset, gain = (np.concatenate(column) for column in zip(*columns, strict=True))
-    return HistoryObservation(layout, Scaling(offset, gain), torque, count)
+    scaling = Scaling(*(np.concatenate(column) for column in zip(*columns, strict=True)))
+    return HistoryObservation(history, scaling, torque, count)
 
 
 def privileged_observation(legs: Simulator, command: Array, sample: Scaling, out: Array32) -> None:
@@ -216,12 +191,12 @@ def privileged_observation(legs: Simulator, command: Array, sample: Scaling, out
     Base height and rate, q (2), qd (2), command, clearance of foot, knee and base, to ``out``, (n,
     ``PRIVILEGED``); the base's height is scaled like the command.
     """
-    offset, gain = sample.offset, sample.gain
-    out[:, PRIVILEGED_HEIGHT] = (legs.height - offset[4]) * gain[4]
+    offset, gain = sample
+    out[:, 0] = (legs.height - offset[4]) * gain[4]
     out[:, 1] = legs.height_rate
     out[:, 2:4] = (legs.q - offset[:2]) * gain[:2]
     out[:, 4:6] = legs.qd * gain[2:4]
-    out[:, PRIVILEGED_COMMAND] = (command - offset[4]) * gain[4]
-    out[:, PRIVILEGED_CLEARANCE] = legs.foot_clearance() * CLEARANCE_GAIN
-    out[:, 8] = legs.knee_clearance() * CLEARANCE_GAIN
-    out[:, 9] = legs.base_clearance() * CLEARANCE_GAIN
+    out[:, 6] = (command - offset[4]) * gain[4]
+    out[:, 7] = legs.foot_clearance() * _CLEARANCE_GAIN
+    out[:, 8] = legs.knee_clearance() * _CLEARANCE_GAIN
+    out[:, 9] = legs.base_clearance() * _CLEARANCE_GAIN
