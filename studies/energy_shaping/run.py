@@ -54,12 +54,22 @@ class Case:
 
 def cases(robot: Robot) -> list[Case]:
     """Return every case for a leg: laws, rates, disturbances, ablations, changed legs."""
-    tuned = tuned_energy_shaping(robot)
-    paper = paper_energy_shaping(robot)
+    tuned, paper = tuned_energy_shaping(robot), paper_energy_shaping(robot)
     knowing = paper_energy_shaping(robot, true_contact=True)
     waiting = paper_energy_shaping(robot, true_contact=True)
     waiting.options = replace(waiting.options, liftoff="true")
-    fast = 2 * CONTROL_RATE
+    fast, noise = 2 * CONTROL_RATE, NoiseAndDelay
+    torque = replace(NO_NOISE, torque_noise=noise.torque_noise)
+    late = replace(NO_NOISE, delay_probability=noise.delay_probability)
+    rubbing = replace(robot.rail, friction=3 * robot.rail.friction)
+    others = [load_robot(name) for name in ("legv2", "legv2-paper")]
+
+    def without(name: str, gains: dict[str, float], **options: Any) -> Case:  # noqa: ANN401
+        changed = replace(tuned.gains, **gains), replace(tuned.options, **options)
+        return Case(f"tuned, {name}", EnergyShaping(robot, *changed), robot)
+
+    raw = {"height_offset": 0.0, "height_scale": 1.0}
+    joint = replace(NO_NOISE, joint_noise=noise.joint_noise)
     return [
         Case("tuned", tuned, robot, commands=RANGE),
         Case("tuned, undisturbed", tuned, robot, NO_NOISE, RANGE),
@@ -70,30 +80,9 @@ def cases(robot: Robot) -> list[Case]:
         Case("paper", paper, robot),
         Case("paper, undisturbed", paper, robot, NO_NOISE),
         Case("paper, 400 Hz", paper_energy_shaping(robot, rate=fast), robot),
-        *_noise_shares(tuned, robot),
-        *_ablations(tuned, robot),
-        *_changed_legs(tuned, robot),
-    ]
-
-
-def _noise_shares(tuned: EnergyShaping, robot: Robot) -> list[Case]:
-    joint = replace(NO_NOISE, joint_noise=NoiseAndDelay.joint_noise)
-    torque = replace(NO_NOISE, torque_noise=NoiseAndDelay.torque_noise)
-    delay = replace(NO_NOISE, delay_probability=NoiseAndDelay.delay_probability)
-    return [
         Case("tuned, joint noise only", tuned, robot, joint),
         Case("tuned, torque noise only", tuned, robot, torque),
-        Case("tuned, delay only", tuned, robot, delay),
-    ]
-
-
-def _ablations(tuned: EnergyShaping, robot: Robot) -> list[Case]:
-    def without(name: str, gains: dict[str, float], **options: Any) -> Case:  # noqa: ANN401
-        changed = replace(tuned.gains, **gains), replace(tuned.options, **options)
-        return Case(f"tuned, {name}", EnergyShaping(robot, *changed), robot)
-
-    raw: dict[str, float] = {"height_offset": 0.0, "height_scale": 1.0}
-    return [
+        Case("tuned, delay only", tuned, robot, late),
         without("ballistic estimate", raw, height="ballistic"),
         without("newest sample only", {}, state="latest"),
         without("single-sample contact", {}, contact="rate"),
@@ -101,22 +90,10 @@ def _ablations(tuned: EnergyShaping, robot: Robot) -> list[Case]:
         without("no pull to a leg rate", {"push_damping": 0.0}),
         without("exponent 2", {"exponent": 2.0}),
         without("exponent 1", {"exponent": 1.0}),
-    ]
-
-
-def _changed_legs(tuned: EnergyShaping, robot: Robot) -> list[Case]:
-    soft = load_robot("legv2-paper").contact
-    rail = robot.rail
-    others = [load_robot(name) for name in ("legv2", "legv2-paper")]
-    return [
         Case("tuned, 20 % more mass", tuned, _heavier(robot, 0.2)),
         Case("tuned, 20 % less mass", tuned, _heavier(robot, -0.2)),
-        Case("tuned, soft floor", tuned, replace(robot, contact=soft)),
-        Case(
-            "tuned, three times the rail friction",
-            tuned,
-            replace(robot, rail=replace(rail, friction=3 * rail.friction)),
-        ),
+        Case("tuned, soft floor", tuned, replace(robot, contact=others[1].contact)),
+        Case("tuned, three times the rail friction", tuned, replace(robot, rail=rubbing)),
         *(Case(f"tuned, leg {leg.name}", tuned_energy_shaping(leg), leg) for leg in others),
     ]
 

@@ -1,7 +1,9 @@
 """What was wrong with a trial: the wire, trace and flight recording are asked one by one."""
 
 import math
-from collections.abc import Sequence
+import os
+import signal
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +72,18 @@ def judge_braking(result: Result, braked: float | None) -> None:
     result.braked = braked
     if braked is None or braked > BRAKED_WITHIN:
         result.problems.append("the drives did not brake in time after the host's death")
+
+
+def start_host(work: Callable[[], object]) -> int:
+    """Return the process of a host that does its work and waits to be killed."""
+    child = os.fork()
+    if child == 0:
+        try:
+            work()
+            signal.pause()
+        finally:
+            os._exit(1)
+    return child
 
 
 def problems_of_box(folder: Path) -> list[str]:

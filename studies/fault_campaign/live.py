@@ -26,6 +26,7 @@ from studies.fault_campaign.judging import (
     judge_trace,
     judge_wire,
     problems_of_box,
+    start_host,
 )
 from studies.fault_campaign.wire_log import WireLog
 
@@ -85,14 +86,11 @@ def _hop(scene: Scene, emulator: EmulatorProcess, folder: Path) -> Result:
 def _killed(scene: Scene, emulator: EmulatorProcess, folder: Path) -> Result:
     """Let a process drive the leg and kill it at a moment of the hop."""
     result = Result(words(scene.mishap))
-    child = os.fork()
-    if child == 0:
-        try:
-            link = MoteusLink(scene.robot, open_transport(str(emulator.path)))
-            scene.perform(link, folder)
-            signal.pause()
-        finally:
-            os._exit(1)
+
+    def hop() -> None:
+        scene.perform(MoteusLink(scene.robot, open_transport(str(emulator.path))), folder)
+
+    child = start_host(hop)
     try:
         if not _flown(emulator, scene.mishap.at):
             result.disturbed = True

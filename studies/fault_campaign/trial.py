@@ -20,6 +20,7 @@ from studies.fault_campaign.judging import (
     judge_trace,
     judge_wire,
     problems_of_box,
+    start_host,
 )
 from studies.fault_campaign.wire_log import WireLog
 
@@ -157,18 +158,13 @@ def _hop(scene: Scene) -> Result:
 
 def _killed(scene: Scene) -> list[str]:
     """Hop in a process that is killed; return what is wrong with its black box."""
+
+    def hop() -> None:
+        lockstep = Lockstep(scene.start.build(), checksums=scene.checksums)
+        scene.perform(lockstep.link, Path(folder), StruckClock(lockstep, scene, killed=True))
+
     with tempfile.TemporaryDirectory() as folder:
-        child = os.fork()
-        if child == 0:
-            try:
-                lockstep = Lockstep(scene.start.build(), checksums=scene.checksums)
-                scene.perform(
-                    lockstep.link, Path(folder), StruckClock(lockstep, scene, killed=True)
-                )
-                signal.pause()
-            finally:
-                os._exit(1)
-        _, status = os.waitpid(child, 0)
+        _, status = os.waitpid(start_host(hop), 0)
         if not os.WIFSIGNALED(status) or os.WTERMSIG(status) != signal.SIGKILL:
             return ["the host ended before it was killed"]
         return problems_of_box(Path(folder))

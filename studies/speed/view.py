@@ -41,15 +41,6 @@ _COUNT = """() => {
 }"""
 """Notes when the browser draws."""
 
-_CANVAS = """() => {
-  const canvas = document.querySelector("canvas[data-engine]");
-  const gl = canvas.getContext("webgl2");
-  const about = gl && gl.getExtension("WEBGL_debug_renderer_info");
-  const name = about ? gl.getParameter(about.UNMASKED_RENDERER_WEBGL) : "unknown";
-  return JSON.stringify([[canvas.width, canvas.height], name]);
-}"""
-"""Size of the picture, pixels, and what draws it."""
-
 _NOTE_KEY = """() => addEventListener("keydown", () => {
   window.pressed = performance.timeOrigin + performance.now();
 }, true)"""
@@ -81,8 +72,8 @@ class View:
                 page = new_page(browser)
                 wait_for_leg(page, viewer)
                 page.evaluate(_COUNT)
-                watched = self._watch(page, viewer, live, SIZE)
-                small = self._watch(page, viewer, live, _SMALL_SIZE)
+                watched = self._watch(page, live, SIZE)
+                small = self._watch(page, live, _SMALL_SIZE)
                 _resize(page, SIZE)
                 if self.picture is not None:
                     _save_picture(page, self.picture)
@@ -122,23 +113,17 @@ class View:
             finally:
                 process.terminate()
 
-    def _watch(
-        self, page: "Page", viewer: Viewer, live: LiveSimulation, window: tuple[int, int]
-    ) -> Row:
+    def _watch(self, page: "Page", live: LiveSimulation, window: tuple[int, int]) -> Row:
         """Return what passes in a window of a size, pixels, while nobody interferes."""
         _resize(page, window)
-        first = (time.monotonic(), live.now, viewer.frames)
+        first = (time.monotonic(), live.now)
         page.evaluate("window.drawn.length = 0")
         page.wait_for_timeout(1e3 * self.seconds)
         drawn = json.loads(page.evaluate("JSON.stringify(window.drawn)"))
-        wall, shown, sent = np.subtract((time.monotonic(), live.now, viewer.frames), first)
-        size, renderer = json.loads(page.evaluate(_CANVAS))
+        wall, shown = np.subtract((time.monotonic(), live.now), first)
         return {
             "window": list(window),
-            "canvas": size,
-            "renderer": renderer,
             "frames_per_s": 1e3 * (len(drawn) - 1) / (drawn[-1] - drawn[0]),
-            "pictures_sent_per_s": float(sent / wall),
             "real_time": float(shown / wall),
         }
 

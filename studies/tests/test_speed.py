@@ -103,7 +103,6 @@ def test_the_viewer_is_measured_through_the_real_page(tmp_path):
     assert 0 < result["latency_ms"]["median"] <= result["latency_ms"]["most"]
     for watched in (result, result["small_window"]):
         assert 0 < watched["frames_per_s"] < 66
-        assert min(watched["canvas"]) > 0
     assert 0 < result["real_time"] < 1.1
     assert result["start_s"] > 0
     assert picture.stat().st_size < 150_000
