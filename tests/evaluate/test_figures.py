@@ -43,7 +43,6 @@ def test_every_figure_names_its_axes_with_units(judged, fixed):
         drawing.draw_heights({"spring": fixed}),
         drawing.draw_distributions(judged.evaluation),
         drawing.draw_phase_space({"spring": fixed}),
-        drawing.draw_estimate({"spring": with_estimate(fixed)}),
     ]
     for figure in figures:
         labels = [axes.get_xlabel() + axes.get_ylabel() for axes in figure.axes]
@@ -164,7 +163,7 @@ def test_without_opengl_there_is_a_reason_instead(robot, traces, monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "nonsense")
     video = render_hops(robot, "spring", COLOURS[0], traces)
     assert video.content is None
-    assert video.reason.startswith("nonsense: ")
+    assert "libegl1" in video.reason
 
 
 @pytest.mark.slow

@@ -46,7 +46,7 @@ def test_summary_rows_pool_fixed_trials_and_the_sequence(judged):
 
 
 def test_the_json_has_the_promised_names_and_no_nan(judged):
-    data = json.loads(judged.evaluation.dumps())
+    data = json.loads(json.dumps(judged.evaluation.to_json(), allow_nan=False))
     promised = {
         "controller", "robot", "command_m", "median_error_m", "std_m", "hops", "skipped_hops",
         "flight_fraction", "hop_rate_hz", "min_base_height_m", "body_contacts", "max_sink_m",
@@ -56,7 +56,7 @@ def test_the_json_has_the_promised_names_and_no_nan(judged):
     assert data["conditions"]["seeds"] == 2
     row = dataclasses.replace(judged.evaluation.summary[0], median_error_m=float("nan"))
     empty = dataclasses.replace(judged.evaluation, summary=[row])
-    assert json.loads(empty.dumps())["summary"][0]["median_error_m"] is None
+    assert empty.to_json()["summary"][0]["median_error_m"] is None
 
 
 def test_traces_are_stored_one_per_run(judged, tmp_path):

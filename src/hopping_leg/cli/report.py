@@ -1,4 +1,4 @@
-"""Draw what stored traces show: heights over time, distributions, ladder, phase space, estimates.
+"""Draw what stored traces show: heights over time, distributions, ladder, phase space.
 
 Examples:
   hop report runs/first/traces/*.parquet --out runs/first/figures

@@ -2,7 +2,7 @@
 
 import glob
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,21 +16,22 @@ from hopping_leg.robot.parameters import Robot
 
 @dataclass(frozen=True)
 class Entry:
-    """A controller to be judged.
-
-    Attributes:
-        label: Name in all tables.
-        controller: What is run.
-        command_range: Heights it was made for, m, or None for any.
-        group: Name shared by policies of one recipe that differ in the training seed.
-        notes: What a reader of the results must know about it.
-    """
+    """A controller to be judged."""
 
     label: str
+    """Name in all tables."""
     controller: Controller
     command_range: tuple[float, float] | None = None
+    """Heights it was made for, m, or None for any."""
     group: str | None = None
+    """Name shared by policies of one recipe that differ in the training seed."""
     notes: tuple[str, ...] = ()
+    """What a reader of the results must know about it."""
+
+    def reaches(self, heights: Iterable[float]) -> bool:
+        """Tell whether it was made for all of some heights, m."""
+        low, high = self.command_range or (-math.inf, math.inf)
+        return all(low - 1e-9 <= height <= high + 1e-9 for height in heights)
 
 
 def load_entries(names: Sequence[str], robot: Robot, rate: float) -> list[Entry]:
@@ -72,13 +73,13 @@ def check_range(entry: Entry, commands: Sequence[float]) -> None:
     Raises:
         UsageError: One is outside of the range that it was trained for.
     """
-    low, high = entry.command_range or (-math.inf, math.inf)
-    outside = [c for c in commands if not low - 1e-9 <= c <= high + 1e-9]
-    if outside:
-        raise UsageError(
-            f"'{entry.label}' cannot be asked for {outside[0]:g} m: it was trained for"
-            f" {low:g} to {high:g} m; choose --commands within that range."
-        )
+    for height in commands:
+        if entry.command_range and not entry.reaches([height]):
+            low, high = entry.command_range
+            raise UsageError(
+                f"'{entry.label}' cannot be asked for {height:g} m: it was trained for"
+                f" {low:g} to {high:g} m; choose --commands within that range."
+            )
 
 
 def fingerprint(controller: Controller) -> str:
@@ -106,9 +107,7 @@ def _expand(text: str) -> list[tuple[str, str]]:
 
 def entry_of(label: str, controller: Controller) -> Entry:
     """Return a controller as an entry, a policy with the range of commands that it was made for."""
-    if not isinstance(controller, Policy):
-        return Entry(label, controller)
-    return Entry(label, controller, controller.command_range)
+    return Entry(label, controller, getattr(controller, "command_range", None))
 
 
 def _load(name: str, source: str, robot: Robot, rate: float) -> Entry:

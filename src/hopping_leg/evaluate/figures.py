@@ -1,4 +1,4 @@
-"""Figures: heights over time, phase space, distributions, ladder, robustness, learning curves."""
+"""Figures: heights over time, phase space, distributions, ladder, robustness."""
 
 import itertools
 import math
@@ -14,13 +14,12 @@ from matplotlib.figure import Figure
 from hopping_leg import figure_style, hop_detection
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.colours import COMMAND, controller_colours
-from hopping_leg.evaluate.metrics import ESTIMATED_HEIGHT, START_SECONDS, SWITCH_SECONDS, stretches
+from hopping_leg.evaluate.metrics import START_SECONDS, SWITCH_SECONDS, stretches
 from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.figure_style import WIDTH, styled
 from hopping_leg.trace import Trace
 
 _PHASE_SPACE_SECONDS = 10.0  # of the paper's trial
-_ESTIMATE_SECONDS = 3.0  # in which estimate and truth are drawn
 _TYPICAL = 99.0  # percentile up to which a scale reaches, where single ticks are far outside
 _ENOUGH = 5  # hops from which on a shape is drawn around the dots
 _COLUMNS = 4  # panels of robustness beside each other
@@ -126,51 +125,6 @@ def _draw_example_phase(axes: Axes, angle: Array, speed: Array, phase: BoolArray
     look: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyle": "none"}
     for tick, marker, label in ((start, "o", "start"), (end - 1, "D", "end")):
         axes.plot(angle[tick], speed[tick], marker=marker, markersize=7, label=label, **look)
-
-
-@styled
-def draw_estimate(traces: Mapping[str, Trace]) -> Figure:
-    """Draw estimated and true height over a few hops, and the error over the whole run.
-
-    A row per controller, on the same axes. An estimate jumps where its joint sample is late or the
-    leg changes its phase, so its ticks are dots without a line between them.
-    """
-    figure = Figure(figsize=(WIDTH, 2.7 * len(traces) + 0.4), layout="constrained")
-    panels = figure.subplots(len(traces), 2, width_ratios=(2, 1), sharex="col", squeeze=False)
-    found = {name: _estimate_errors(trace) for name, trace in traces.items()}
-    every = np.concatenate([error for error, _ in found.values()])
-    low, high = np.percentile(every, (100 - _TYPICAL, _TYPICAL)) if len(every) else (-1.0, 1.0)
-    bins = np.linspace(low - 1, high + 1, 50)
-    heights = np.concatenate([trace.column("height_m") for trace in traces.values()])
-    for (over_time, spread), (name, paint) in zip(
-        panels, controller_colours(traces).items(), strict=True
-    ):
-        time, height, estimate = (
-            traces[name].column(n) for n in ("time_s", "height_m", ESTIMATED_HEIGHT)
-        )
-        shown = (time >= START_SECONDS) & (time < START_SECONDS + _ESTIMATE_SECONDS)
-        over_time.plot(time[shown], height[shown], color="black", linewidth=1, label="true")
-        over_time.plot(time[shown], estimate[shown], ".", color=paint, ms=3, label="estimated")
-        over_time.set(ylabel="base height / m", title=name)
-        over_time.set_ylim(heights.min() - 0.02, heights.max() + 0.06)
-        over_time.legend(loc="upper right", ncols=2)
-        error, flight = found[name]
-        for label, phase, line in (("flight", flight, "-"), ("stance", ~flight, ":")):
-            look: dict[str, Any] = {"histtype": "step", "density": True, "linestyle": line}
-            spread.hist(error[phase], bins=bins, color=paint, label=label, **look)
-        spread.set_ylabel("density / (1/mm)")
-        spread.legend()
-    panels[-1][0].set_xlabel("time / s")
-    panels[-1][1].set_xlabel("estimated - true / mm")
-    return figure
-
-
-def _estimate_errors(trace: Trace) -> tuple[Array, BoolArray]:
-    """Return estimated minus true height, mm, where it is known, and whether that is in flight."""
-    error = 1e3 * (trace.column(ESTIMATED_HEIGHT) - trace.column("height_m"))
-    known = (trace.column("time_s") >= START_SECONDS) & np.isfinite(error)
-    flight = trace.column("foot_clearance_m") >= hop_detection.FLIGHT_CLEARANCE
-    return error[known], flight[known]
 
 
 @styled

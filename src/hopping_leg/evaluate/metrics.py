@@ -135,40 +135,26 @@ ESTIMATED_APEX = "estimated_apex_m"
 """Trace column: height of the last apex as estimated after its flight, m."""
 
 
-def has_estimate(trace: Trace) -> bool:
-    """Tell whether a run has an estimated height and a true one to compare it with."""
-    if ESTIMATED_HEIGHT not in trace.table.columns:
-        return False
-    both = trace.column(ESTIMATED_HEIGHT) - trace.column("height_m")
-    return bool(np.isfinite(both).any())
-
-
 def judge_estimator(controller: str, traces: Sequence[Trace]) -> result.Estimator | None:
     """Compare estimated with true heights after the first 2 s; None where there is no estimate."""
-    estimating = [trace for trace in traces if has_estimate(trace)]
-    if not estimating:
+    flight, stance, apex = [], [], []
+    for trace in traces:
+        if ESTIMATED_HEIGHT in trace.table.columns:
+            error = trace.column(ESTIMATED_HEIGHT) - trace.column("height_m")
+            known = (trace.column("time_s") >= START_SECONDS) & np.isfinite(error)
+            flying = trace.column("foot_clearance_m") >= FLIGHT_CLEARANCE
+            flight.append(error[known & flying])
+            stance.append(error[known & ~flying])
+            apex.append(apex_errors(trace))
+    if not any(map(len, flight + stance)):
         return None
-    flight = np.concatenate([_errors(trace, flying=True) for trace in estimating])
-    stance = np.concatenate([_errors(trace, flying=False) for trace in estimating])
-    apex = np.concatenate([apex_errors(trace) for trace in estimating])
-    return result.Estimator(
-        controller=controller,
-        flight_bias_m=statistics.of(np.mean, flight),
-        flight_std_m=statistics.of(np.std, flight),
-        stance_bias_m=statistics.of(np.mean, stance),
-        stance_std_m=statistics.of(np.std, stance),
-        apex_bias_m=statistics.of(np.mean, apex),
-        apex_std_m=statistics.of(np.std, apex),
-        hops=len(apex),
-    )
-
-
-def _errors(trace: Trace, *, flying: bool) -> Array:
-    error = trace.column(ESTIMATED_HEIGHT) - trace.column("height_m")
-    settled = trace.column("time_s") >= START_SECONDS
-    phase = (trace.column("foot_clearance_m") >= FLIGHT_CLEARANCE) == flying
-    chosen: Array = error[settled & phase & np.isfinite(error)]
-    return chosen
+    found = {"flight": flight, "stance": stance, "apex": apex}
+    numbers = {
+        f"{name}_{what}_m": statistics.of(statistic, np.concatenate(errors))
+        for name, errors in found.items()
+        for what, statistic in (("bias", np.mean), ("std", np.std))
+    }
+    return result.Estimator(controller, hops=sum(map(len, apex)), **numbers)
 
 
 def apex_errors(trace: Trace) -> Array:

@@ -10,7 +10,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from hopping_leg.colours import controller_colours
-from hopping_leg.evaluate import figures, metrics, runner, tables
+from hopping_leg.evaluate import figures, runner, tables
 from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.evaluate.trials import Run
 from hopping_leg.evaluate.video import Video, fixed_traces, render_hops
@@ -95,10 +95,6 @@ def _figures(evaluation: Evaluation, runs: Sequence[Run]) -> Iterator[Picture]:
             figures.draw_phase_space(_traces(examples)),
             examples,
         )
-    if estimated := [run for run in examples if metrics.has_estimate(run.trace)]:
-        caption = "Height as controllers estimate it from their joints, and the true one."
-        figure = figures.draw_estimate(_traces(estimated))
-        yield Picture("estimate", "Estimated height", caption, figure, estimated)
 
 
 def _first(runs: Iterable[Run]) -> list[Run]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from hopping_leg.evaluate.motor_load import MotorLoad
 from hopping_leg.evaluate.statistics import Neighbours
-from hopping_leg.io import json_text, plain, write_json
+from hopping_leg.io import plain, write_json
 
 SCHEMA = 2
 """Version of the JSON, raised when a name changes its meaning."""
@@ -161,20 +161,7 @@ class Evaluation:
 
     def to_json(self) -> dict[str, Any]:
         """Return plain values; numbers that do not exist are None."""
-        return {"schema": SCHEMA, **plain(_rounded(asdict(self)))}
-
-    def dumps(self) -> bytes:
-        """Return readable JSON."""
-        return json_text(self.to_json()).encode()
-
-
-def _rounded(value: Any) -> Any:  # noqa: ANN401
-    """Round numbers to nine digits after the point; small p-values stay as they are."""
-    if isinstance(value, dict):
-        return {key: _rounded(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_rounded(entry) for entry in value]
-    return round(value, 9) if isinstance(value, float) and abs(value) > 1e-6 else value
+        return {"schema": SCHEMA, **plain(asdict(self))}
 
 
 @dataclass(frozen=True)

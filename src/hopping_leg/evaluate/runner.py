@@ -51,16 +51,17 @@ def evaluate(
             or there is nothing to do.
     """
     trials.check_repeats(repeats)
-    planned = trials.paper_trials(setup.robot, commands)
-    _check(entries, planned, asked=commands is not None)
-    planned = [trial for trial in planned if trial.kind in kinds]
-    world = trials.on_floor(setup, floor)
+    check_labels(entries)
+    heights = trials.choose_commands(setup.robot, commands)
+    for entry in entries:
+        if commands is not None or not any(entry.reaches([height]) for height in heights):
+            check_range(entry, heights)
+    planned = [t for t in trials.paper_trials(setup.robot, heights) if t.kind in kinds]
+    world = replace(setup, robot=trials.floor_robot(setup.robot, floor))
     notes = _note_setup(setup)
     runs: list[trials.Run] = []
     for entry in entries:
-        fitting = [t for t in planned if trials.within(t, entry.command_range)]
-        notes += entry.notes
-        notes += _note_left_out(entry, planned, fitting)
+        fitting = [t for t in planned if entry.reaches(height for height, _ in t.steps)]
         own = trials.run_trials(
             entry.label,
             entry.controller,
@@ -70,48 +71,34 @@ def evaluate(
             seed=seed,
             on_progress=functools.partial(on_progress, entry.label),
         )
+        notes += entry.notes
+        notes += _note_left_out(entry, [t for t in planned if t not in fitting])
         notes += _note_stopped(entry.label, own, setup)
         runs += own
     measured = aggregation.tabulate(runs, [c.label for c in entries], seed, world.robot)
-    members: dict[str, list[str]] = {}
-    for entry in entries:
-        members.setdefault(entry.group or "", []).append(entry.label)
-    groups = {
-        name: [row for row in measured.summary if row.controller in labels]
-        for name, labels in members.items()
-        if name and len(labels) > 1
+    members = {
+        group: [row for c in entries if c.group == group for row in measured.rows(c.label)]
+        for group in dict.fromkeys(c.group for c in entries if c.group)
     }
-    return EvaluationRun(
-        replace(
-            measured,
-            groups=[
-                row for name in groups for row in aggregation.pool_group(name, groups[name], seed)
-            ],
-            conditions={
-                **setup_conditions(setup),
-                "floor": floor,
-                "floor_meaning": trials.FLOORS[floor],
-                "contact_time_constant_s": world.robot.contact.time_constant,
-                "contact_damping_ratio": world.robot.contact.damping_ratio,
-                "motors": motor_load.constants(world.robot),
-                "seed": seed,
-                "seeds": repeats,
-            },
-            versions=software_versions(),
-            notes=notes,
-        ),
-        runs,
+    evaluation = replace(
+        measured,
+        groups=[
+            row for g, rows in members.items() for row in aggregation.pool_group(g, rows, seed)
+        ],
+        conditions={
+            **setup_conditions(setup),
+            "floor": floor,
+            "floor_meaning": trials.FLOORS[floor],
+            "contact_time_constant_s": world.robot.contact.time_constant,
+            "contact_damping_ratio": world.robot.contact.damping_ratio,
+            "motors": motor_load.constants(world.robot),
+            "seed": seed,
+            "seeds": repeats,
+        },
+        versions=software_versions(),
+        notes=notes,
     )
-
-
-def _check(entries: Sequence[Entry], planned: Sequence[trials.Trial], *, asked: bool) -> None:
-    """Refuse commands that were asked for by name, or ranges that leave none of the fixed ones."""
-    check_labels(entries)
-    fixed = [trial for trial in planned if trial.kind == "fixed"]
-    for entry in entries:
-        outside = [trial for trial in fixed if not trials.within(trial, entry.command_range)]
-        if asked or len(outside) == len(fixed):
-            check_range(entry, [height for trial in outside for height, _ in trial.steps])
+    return EvaluationRun(evaluation, runs)
 
 
 def _note_setup(setup: RolloutConfig) -> list[str]:
@@ -130,10 +117,7 @@ def _note_setup(setup: RolloutConfig) -> list[str]:
     return notes
 
 
-def _note_left_out(
-    entry: Entry, planned: Sequence[trials.Trial], fitting: Sequence[trials.Trial]
-) -> list[str]:
-    left_out = [t for t in planned if t not in fitting]
+def _note_left_out(entry: Entry, left_out: Sequence[trials.Trial]) -> list[str]:
     if not left_out or entry.command_range is None:
         return []
     low, high = entry.command_range

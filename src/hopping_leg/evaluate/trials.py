@@ -89,18 +89,8 @@ def check_repeats(repeats: int) -> None:
         raise errors.UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
 
 
-def within(trial: Trial, bounds: tuple[float, float] | None) -> bool:
-    """Tell whether all commands of a trial lie within a controller's range."""
-    if bounds is None:
-        return True
-    return all(bounds[0] - 1e-9 <= c <= bounds[1] + 1e-9 for c, _ in trial.steps)
-
-
 FLOORS = {"soft": "the robot's own contact", "stiff": "MuJoCo's default contact, solref 0.02 1"}
 """Grounds to be judged on."""
-
-Progress = Callable[[float], None]
-"""Called with the share done, 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -132,15 +122,6 @@ def floor_robot(robot: Robot, floor: str) -> Robot:
     return replace(robot, contact=Contact(0.02, 1.0, robot.contact.friction), reality=reality)
 
 
-def on_floor(setup: RolloutConfig, floor: str) -> RolloutConfig:
-    """Return the world with another floor.
-
-    Raises:
-        UsageError: There is no such floor.
-    """
-    return replace(setup, robot=floor_robot(setup.robot, floor))
-
-
 def run_trials(
     label: str,
     controller: Controller,
@@ -149,34 +130,32 @@ def run_trials(
     *,
     repeats: int,
     seed: int,
-    on_progress: Progress = lambda _: None,
+    on_progress: Callable[[float], None] = lambda _share: None,
 ) -> list[Run]:
     """Record all trials of one controller; those of equal length run as one batch.
 
-    Each has so many realisations of noise and delay, which follow from the seed.
+    Each has so many realisations of noise and delay, which follow from the seed. ``on_progress``
+    is called with the share done.
     """
-    lengths = sorted({trial.seconds for trial in trials})
-    batches = [[t for t in trials if t.seconds == length] for length in lengths]
-    total = sum(len(b) * b[0].seconds for b in batches)
-    done = 0.0
+    total, done = sum(trial.seconds for trial in trials), 0.0
     runs: list[Run] = []
-    for batch in batches:
-        share = len(batch) * batch[0].seconds / total
+    for seconds in sorted({trial.seconds for trial in trials}):
+        batch = [trial for trial in trials if trial.seconds == seconds]
+        share = len(batch) * seconds / total
 
         def on_tick(tick: int, ticks: int, done: float = done, share: float = share) -> None:
             on_progress(done + share * tick / ticks)
 
         legs = [(trial, repeat) for trial in batch for repeat in range(repeats)]
         commands = np.stack([trial.commands(setup.rate) for trial, _ in legs], axis=1)
-        noise = np.random.SeedSequence([seed, round(1000 * batch[0].seconds)]).generate_state(1)
+        noise = np.random.SeedSequence([seed, round(1000 * seconds)]).generate_state(1)
         record = rollout(controller, setup, commands, int(noise[0]), on_tick)
         for leg, (trial, repeat) in enumerate(legs):
             header = {"trial": trial.name, "kind": trial.kind, "repeat": repeat, "seed": seed}
             trace = record.trace(leg, controller=label, **header)
             runs.append(Run(label, trial, repeat, trace))
         done += share
-    order = {trial.name: i for i, trial in enumerate(trials)}
-    return sorted(runs, key=lambda run: (order[run.trial.name], run.repeat))
+    return sorted(runs, key=lambda run: (trials.index(run.trial), run.repeat))
 
 
 def save_traces(runs: Sequence[Run], directory: Path) -> list[Path]:

@@ -1,8 +1,8 @@
 """Short videos of hops side by side, rendered off screen in a process of its own.
 
 OpenGL drivers crash, hang or are missing; none of that may take an evaluation down. That process is
-``python -m hopping_leg.evaluate.video XML CLIPS OUT``, as MuJoCo chooses the OpenGL backend when
-it is imported.
+``python -m hopping_leg.evaluate.video XML CLIPS OUT``, as MuJoCo chooses OpenGL's back end, EGL
+unless MUJOCO_GL names another, when it is imported.
 """
 
 import json
@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import mujoco
 import numpy as np
@@ -26,18 +26,11 @@ from hopping_leg.robot import Robot, get_spec
 from hopping_leg.trace import Trace
 
 Animation = Literal["webp", "gif"]
-BACKENDS = ("egl", "osmesa")
-"""Ways to OpenGL without a screen, in the order of trying."""
 CLIP_SECONDS = 1.2
 FRAME_RATE = 33.3  # frames per second of simulated time
 SLOWDOWN = 2.0
 SIZE = (380, 400)  # width and height of one leg's picture, pixels
-TIMEOUT = 240.0  # given to one backend, s
-_ENCODING: dict[str, dict[str, Any]] = {
-    ".webp": {"quality": 60, "method": 4},
-    ".gif": {"optimize": True},
-}
-"""By the file's ending."""
+_TIMEOUT = 240.0  # s
 
 
 @dataclass(frozen=True)
@@ -115,48 +108,37 @@ def render_clips(
         model.write_text(spec.to_xml(), encoding="utf-8")
         content = {"milliseconds": milliseconds, "clips": [asdict(clip) for clip in clips]}
         motion.write_text(json.dumps(content), encoding="utf-8")
-        reasons = []
-        chosen = os.environ.get("MUJOCO_GL", "").lower()
-        for backend in (chosen,) if chosen else BACKENDS:
-            reason = _render(backend, model, motion, out)
-            if reason is None:
-                return Video(out.read_bytes())
-            reasons.append(f"{backend}: {reason}")
-    return Video(None, f"{'; '.join(reasons)} (Mesa's libegl1 or libosmesa6 would do)")
-
-
-def _render(backend: str, model: Path, motion: Path, out: Path) -> str | None:
-    """Render in another process; return what went wrong or None."""
-    command = [sys.executable, "-m", "hopping_leg.evaluate.video"]
-    command += [str(model), str(motion), str(out)]
-    environment = {**os.environ, "MUJOCO_GL": backend}
-    if backend == "osmesa":
-        environment["PYOPENGL_PLATFORM"] = "osmesa"
-    try:
-        done = subprocess.run(
-            command, env=environment, capture_output=True, text=True, timeout=TIMEOUT, check=False
-        )
-    except subprocess.TimeoutExpired:
-        return f"took longer than {TIMEOUT:.0f} s"
-    if done.returncode == 0 and out.is_file():
-        return None
-    lines = [line for line in done.stderr.splitlines() if line.strip() and line[0] != " "]
-    return lines[-1] if lines else f"the renderer ended with code {done.returncode}"
+        command = [
+            sys.executable,
+            "-m",
+            "hopping_leg.evaluate.video",
+            *map(str, (model, motion, out)),
+        ]
+        try:
+            done = subprocess.run(
+                command,
+                env={"MUJOCO_GL": "egl", **os.environ},
+                capture_output=True,
+                text=True,
+                timeout=_TIMEOUT,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            return Video(None, f"it took longer than {_TIMEOUT:.0f} s")
+        if done.returncode == 0 and out.is_file():
+            return Video(out.read_bytes())
+    said = [line for line in done.stderr.splitlines() if line.strip() and line[0] != " "]
+    reason = said[-1] if said else f"the renderer ended with code {done.returncode}"
+    return Video(None, f"{reason} (Mesa's libegl1 would do, or MUJOCO_GL=osmesa and libosmesa6)")
 
 
 def _main(xml: str, motion: str, out: str) -> None:
     """Render clips to a file; arguments as in the module's docstring."""
     content = json.loads(Path(motion).read_text(encoding="utf-8"))
     clips = [Clip(**clip) for clip in content["clips"]]
-    frames = _draw_frames(mujoco.MjModel.from_xml_path(xml), clips)
-    frames[0].save(
-        out,
-        save_all=True,
-        append_images=frames[1:],
-        duration=round(content["milliseconds"]),
-        loop=0,
-        **_ENCODING[Path(out).suffix],
-    )
+    first, *others = _draw_frames(mujoco.MjModel.from_xml_path(xml), clips)
+    duration = round(content["milliseconds"])
+    first.save(out, save_all=True, append_images=others, duration=duration, loop=0, quality=60)
 
 
 def _draw_frames(model: mujoco.MjModel, clips: Sequence[Clip]) -> list[Image.Image]:
