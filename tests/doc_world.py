@@ -44,26 +44,14 @@ SECONDS = {
 }
 """Lengths of the paper's trials, which have no option."""
 
-ELSEWHERE = {
-    **dict.fromkeys(
-        ("hop evaluate runs/my_leg/gains.toml", "hop evaluate runs/heron/tuned/gains.toml"),
-        "minutes of search before: studies/tests/test_energy_shaping.py",
-    ),
-    "hop reproduce": "minutes even with --quick: tests/cli/test_reproduce.py",
+ELSEWHERE = ("hop evaluate runs/my_leg/gains.toml", "hop reproduce")
+"""Commands that would take minutes and have tests elsewhere; here only their options must parse."""
+
+CODES = {
+    "hop train --recipe paper --seed 0 --out runs/mine": cli.INTERRUPTED,
+    "hop doctor --transport /dev/fdcanusb --robot my_leg.toml --home 0.0 0.0": cli.FAILED,
 }
-"""Commands that are not run here, and why; their options must parse all the same."""
-
-INTERRUPTED = dict.fromkeys(
-    (
-        "hop train --recipe paper --seed 0 --out runs/mine",
-        "hop train --recipe fast --out runs/continued",
-    ),
-    cli.INTERRUPTED,
-)
-"""Commands that are interrupted here, as their page goes on with them, and their exit code."""
-
-REFUSED = {"hop doctor --transport /dev/fdcanusb --robot my_leg.toml --home 0.0 0.0": cli.FAILED}
-"""Commands that do their work and then refuse, as their page says: a straight leg is not armed."""
+"""Exit codes other than 0: a training that is interrupted, a straight leg that is not armed."""
 
 BEFORE = {"own-controller": "class TheirController:\n    def __init__(self, mass, dt): pass"}
 """Python that a page takes for granted."""

@@ -21,7 +21,7 @@ CEILINGS = {
     "src/hopping_leg/sim/**/*.py": (13, 2520),
     "src/hopping_leg/viewer/**/*.py": (9, 1510),
     "src/**/*.py": (202, 31920),
-    "tests/**/*.py": (147, 17420),
+    "tests/**/*.py": (147, 17260),
     "studies/**/*.py": (83, 8530),
     "docs/**/*.md": (22, 2710),
     "docs/live/*.js": (13, 1490),
