@@ -1,35 +1,32 @@
 """Someone else's controller: a Python class, named ``path/to/file.py:Class`` or ``module:Class``.
 
 The class is made as ``Class(robot, rate=rate)``. It implements ``Controller``, of which ``name``
-and ``internals`` may be left out, or controls one leg as RealAIGym's users write it. Two signatures
-are known; both return the torques of hip and knee, N m, (2,), or a triple ``(None, None,
-torques)``:
+and ``internals`` may be left out, or controls one leg, as RealAIGym's users write it, by
 
     get_control_output(meas_pos, meas_vel, meas_tau, meas_time)   # (2,), (2,), (2,), s
-    get_control_output(x, t)                                      # (q1, q2, qd1, qd2), s
 
-Whatever it does, the caller gets torques or one sentence that names it.
+which returns the torques of hip and knee, N m, (2,). Whatever it does, the caller gets torques or
+one sentence that names it.
 """
 
-import functools
+import contextlib
 import hashlib
 import importlib
 import importlib.util
 import inspect
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import ControllerError, HoppingLegError, unknown_name
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.sim.channel import Measurement
 from hopping_leg.trace import COLUMNS
 
@@ -38,103 +35,39 @@ COMMAND = "desired_height"  # its attribute that holds the commanded apex height
 
 
 class SingleLeg:
-    """Gives every leg a controller of its own, made at every reset; implements ``Controller``.
+    """Gives every leg a controller of its own, made at every reset, at a period in s."""
 
-    Raises:
-        ControllerError: The method takes other arguments than the known ones.
-    """
-
-    def __init__(
-        self, make: Callable[[], Any], rate: float = CONTROL_RATE, name: str = "single-leg"
-    ) -> None:
-        self.name, self._make, self._period = name, make, 1 / rate
-        self._takes_state = _takes_state(make(), name)
-        self.reset(1)
+    def __init__(self, make: Callable[[], Any], period: float) -> None:
+        self._make, self._period = make, period
 
     def reset(self, count: int) -> None:
         """Make new controllers; time begins at zero."""
         self._legs = [self._make() for _ in range(count)]
-        for leg in self._legs:
-            if callable(begin := getattr(leg, "init", None)):
-                begin()
-        self._torque = np.zeros((count, 2))
-        self._tick = 0
+        self._torque, self._tick = np.zeros((count, 2)), 0
 
-    def act(self, measurement: Measurement) -> Array:
-        """Return joint torques, N m, (n, 2); the measured torque shown is the last answer.
-
-        Raises:
-            ControllerError: An answer is no pair of torques.
-        """
-        time = self._tick * self._period
-        torque = np.empty_like(self._torque)
+    def act(self, measurement: Measurement) -> list[Any]:
+        """Return what each leg's controller answers; the torque shown is the last answer."""
+        time, answers = self._tick * self._period, []
         for i, leg in enumerate(self._legs):
             setattr(leg, COMMAND, float(measurement.command[i, 0]))
             q, qd = measurement.q[i, 0].copy(), measurement.qd[i, 0].copy()
-            if self._takes_state:
-                answer = leg.get_control_output(np.concatenate([q, qd]), time)
-            else:
-                answer = leg.get_control_output(q, qd, self._torque[i].copy(), time)
-            torque[i] = _torques(answer, self.name)
-        self._torque, self._tick = torque, self._tick + 1
-        return torque.copy()
-
-    def internals(self) -> dict[str, Array]:
-        """Return nothing else worth recording."""
-        return {}
-
-
-def _takes_state(leg: object, name: str) -> bool:
-    """Return whether a controller takes (x, t) rather than the four measured values."""
-    given = list(inspect.signature(getattr(leg, METHOD)).parameters.values())
-    needed = [p.name for p in given if p.default is p.empty and p.kind is p.POSITIONAL_OR_KEYWORD]
-    names = [p.name for p in given]
-    if names[:1] == ["x"] and len(needed) <= 2 <= len(names):
-        return True
-    if len(needed) <= 4 <= len(names):
-        return False
-    raise ControllerError(
-        f"'{METHOD}' of '{name}' takes ({', '.join(names)}) but must take (meas_pos, meas_vel,"
-        " meas_tau, meas_time) or (x, t)."
-    )
-
-
-def _torques(answer: Any, name: str) -> Array:  # noqa: ANN401
-    if isinstance(answer, tuple) and len(answer) == 3:
-        position, velocity, answer = answer
-        if position is not None or velocity is not None:
-            raise ControllerError(
-                f"'{METHOD}' of '{name}' asks for positions or velocities; legs take torques alone,"
-                " so compute them and return (None, None, torques)."
-            )
-    try:
-        torque = np.asarray(answer, dtype=np.float64)
-    except (TypeError, ValueError):
-        torque = np.empty(0)
-    if torque.shape != (2,):
-        raise ControllerError(
-            f"'{METHOD}' of '{name}' answered {answer!r:.60} but must return the torques of hip and"
-            " knee, (2,)."
-        )
-    return torque
-
-
-T = TypeVar("T")
+            answers.append(leg.get_control_output(q, qd, self._torque[i].copy(), time))
+        self._torque, self._tick = np.array(answers, np.float64), self._tick + 1
+        return answers
 
 
 class UserController:
     """Guards a controller of someone else, named ``origin``; implements ``Controller``."""
 
-    def __init__(self, controller: Any, origin: str) -> None:  # noqa: ANN401
-        self.controller, self.origin = controller, origin
-        named = getattr(controller, "name", None)
-        self.name = (named if isinstance(named, str) else origin).rpartition(":")[2]
-        self._count = 0
+    def __init__(self, controller: Any, origin: str, name: object = None) -> None:  # noqa: ANN401
+        self.controller, self.origin, self._count = controller, origin, 0
+        self.name = (name if isinstance(name, str) else origin).rpartition(":")[2]
 
     def reset(self, count: int) -> None:
         """Forget everything; the next measurement has ``count`` rows."""
         self._count = count
-        attempt(self.origin, lambda: self.controller.reset(count))
+        with guarded(self.origin):
+            self.controller.reset(count)
 
     def act(self, measurement: Measurement) -> Array:
         """Return joint torques, N m, (n, 2).
@@ -142,18 +75,13 @@ class UserController:
         Raises:
             ControllerError: The controller failed or answered something else than torques.
         """
-        answer = attempt(self.origin, lambda: self.controller.act(measurement))
-        torque = self._array(answer, "torques")
-        if torque.shape != (self._count, 2):
+        with guarded(self.origin):
+            torque = np.array(self.controller.act(measurement), np.float64)
+        if torque.shape != (self._count, 2) or not np.isfinite(torque).all():
             raise ControllerError(
-                f"Controller '{self.origin}' answered an array of shape {torque.shape}; torques of"
-                f" hip and knee are ({self._count}, 2)."
-            )
-        if not np.isfinite(torque).all():
-            leg = int(np.flatnonzero(~np.isfinite(torque).all(axis=1))[0])
-            raise ControllerError(
-                f"Controller '{self.origin}' answered torques of {torque[leg].tolist()} N m; they"
-                " must be finite."
+                f"Controller '{self.origin}' must answer finite torques of hip and knee, in N m and"
+                f" in the shape ({self._count}, 2), not {torque.tolist()!r:.60} in"
+                f" {torque.shape}."
             )
         return torque
 
@@ -163,38 +91,19 @@ class UserController:
         Raises:
             ControllerError: It is no dictionary of (n,), or would replace a column of the trace.
         """
-        method = getattr(self.controller, "internals", None)
-        if method is None:
+        if not hasattr(self.controller, "internals"):
             return {}
-        found = attempt(self.origin, method)
-        if not isinstance(found, dict) or not all(isinstance(name, str) for name in found):
+        with guarded(self.origin):
+            found = {
+                name: np.broadcast_to(np.asarray(values, np.float64), self._count)
+                for name, values in self.controller.internals().items()
+            }
+        if taken := set(found) & set(COLUMNS):
             raise ControllerError(
-                f"'internals' of controller '{self.origin}' must return a dictionary of arrays."
+                f"'internals' of controller '{self.origin}' names '{min(taken)}', which every trace"
+                " has; choose another name."
             )
-        return {name: self._column(name, values) for name, values in found.items()}
-
-    def _column(self, name: str, values: object) -> Array:
-        if name in COLUMNS:
-            raise ControllerError(
-                f"'internals' of controller '{self.origin}' names '{name}', which every trace has;"
-                " choose another name."
-            )
-        column = self._array(values, f"'{name}'")
-        if column.shape not in ((), (self._count,)):
-            raise ControllerError(
-                f"'{name}' of controller '{self.origin}' has shape {column.shape} but must be"
-                f" ({self._count},)."
-            )
-        return np.broadcast_to(column, self._count)
-
-    def _array(self, values: object, what: str) -> Array:
-        try:
-            return np.asarray(values, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise ControllerError(
-                f"Controller '{self.origin}' answered {what} that are no numbers:"
-                f" {type(values).__name__}."
-            ) from error
+        return found
 
 
 def is_user_controller(name: str) -> bool:
@@ -210,23 +119,23 @@ def load_user_controller(name: str, robot: Robot, rate: float) -> UserController
     Raises:
         ControllerError: There is no such file, module or class, it fails, or is no controller.
     """
-    module, kind, wanted = _find(name, "class", callable)
-    make: Callable[[], Any] = functools.partial(kind, robot, rate=rate)
-    controller = attempt(name, make, f"could not be made as {wanted}(robot, rate={rate:g})")
+    module, kind = _find(name)
+    with guarded(name, f"could not be made as {name.rpartition(':')[2]}(robot, rate={rate:g})"):
+        controller = kind(robot, rate=rate)
+    named = getattr(controller, "name", None)
     if hasattr(controller, METHOD) and not hasattr(controller, "act"):
-        controller = attempt(name, lambda: SingleLeg(make, rate, name))
-    missing = [m for m in ("reset", "act") if not callable(getattr(controller, m, None))]
-    if missing:
+        controller = SingleLeg(lambda: kind(robot, rate=rate), 1 / rate)
+    if not all(callable(getattr(controller, method, None)) for method in ("reset", "act")):
         raise ControllerError(
-            f"'{name}' is no controller: it lacks the method '{missing[0]}'; a controller has"
-            f" 'reset' and 'act', or '{METHOD}' for a single leg."
+            f"'{name}' is no controller, which has the methods 'reset' and 'act', or '{METHOD}' for"
+            " a single leg."
         )
     # Kept results tell controllers apart by class: with the digest in its name, an edited file is
     # judged anew.
     file = getattr(module, "__file__", None)
     content = Path(file).read_bytes() if file else module.__name__.encode()
-    digest = hashlib.sha256(content).hexdigest()[:16]
-    made: UserController = type(f"UserController_{digest}", (UserController,), {})(controller, name)
+    kind_name = f"UserController_{hashlib.sha256(content).hexdigest()[:16]}"
+    made: UserController = type(kind_name, (UserController,), {})(controller, name, named)
     return made
 
 
@@ -236,37 +145,46 @@ def load_user_object(name: str) -> Any:  # noqa: ANN401
     Raises:
         ControllerError: There is no such file, module or name, or importing it fails.
     """
-    _, found, _ = _find(name, "name", lambda value: value is not None)
-    return found
+    return _find(name)[1]
 
 
-def _find(name: str, what: str, suits: Callable[[object], bool]) -> tuple[ModuleType, Any, str]:
-    """Return module, object and its name; errors list what the module defines."""
+def _find(name: str) -> tuple[ModuleType, Any]:
+    """Return module and object of a name; errors list the classes that the module defines."""
     source, _, wanted = name.rpartition(":")
     if name.endswith(".py"):
         source, wanted = name, ""
-    module = _load_file(Path(source)) if source.endswith(".py") else _load_module(source)
-    found = getattr(module, wanted, None) if wanted else None
-    if not suits(found):
+    load = _load_file if source.endswith(".py") else importlib.import_module
+    with guarded(source, "could not be imported"):
+        module = load(source)
+    if not hasattr(module, wanted):
         classes = inspect.getmembers(module, inspect.isclass)
         known = [n for n, kind in classes if kind.__module__ == module.__name__]
-        if not wanted:
-            raise ControllerError(
-                f"'{name}' names no {what}; write {source}:{what.upper()}, one of:"
-                f" {', '.join(known)}."
-            )
-        raise ControllerError(f"In {source}: " + unknown_name(what, wanted, known))
-    return module, found, wanted
+        hint = "" if wanted else f" Write {source}:CLASS."
+        raise ControllerError(f"In {source}: {unknown_name('class', wanted, known)}{hint}")
+    return module, getattr(module, wanted)
 
 
-def attempt(origin: str, work: Callable[[], T], failure: str = "failed") -> T:
-    """Run code of someone else; what it raises becomes one sentence.
+def _load_file(path: str) -> ModuleType:
+    content = Path(path).read_bytes()
+    # A name of its own keeps files of equal names apart; dataclasses look their module up by it.
+    name = f"hopping_leg_user_file_{hashlib.sha256(content).hexdigest()[:16]}"
+    loader = SourceFileLoader(name, path)
+    spec = importlib.util.spec_from_loader(name, loader)
+    assert spec is not None
+    sys.modules[name] = module = importlib.util.module_from_spec(spec)
+    loader.exec_module(module)
+    return module
+
+
+@contextlib.contextmanager
+def guarded(origin: str, failure: str = "failed") -> Iterator[None]:
+    """Let code of someone else run; what it raises becomes one sentence.
 
     Raises:
         ControllerError: Naming the controller, the error and its line.
     """
     try:
-        return work()
+        yield
     except HoppingLegError:
         raise
     except (Exception, SystemExit) as error:
@@ -275,31 +193,3 @@ def attempt(origin: str, work: Callable[[], T], failure: str = "failed") -> T:
         raise ControllerError(
             f"Controller '{origin}' {failure}: {type(error).__name__}: {error} ({where})."
         ) from error
-
-
-def _load_file(path: Path) -> ModuleType:
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise ControllerError(f"Cannot read {path}: {error.strerror}.") from error
-    # A name of its own keeps files of equal names apart; dataclasses look their module up by it.
-    name = f"hopping_leg_user_file_{hashlib.sha256(content).hexdigest()[:16]}"
-    loader = SourceFileLoader(name, str(path))
-    spec = importlib.util.spec_from_loader(name, loader)
-    assert spec is not None
-    sys.modules[name] = module = importlib.util.module_from_spec(spec)
-    attempt(str(path), lambda: loader.exec_module(module), "could not be imported")
-    return module
-
-
-def _load_module(name: str) -> ModuleType:
-    try:
-        found = importlib.util.find_spec(name)
-    except (ImportError, ValueError):
-        found = None
-    if found is None:
-        raise ControllerError(
-            f"There is no Python module '{name}'; install it, put its folder on PYTHONPATH, or name"
-            " a file as path/to/file.py:CLASS."
-        )
-    return attempt(name, lambda: importlib.import_module(name), "could not be imported")
