@@ -23,7 +23,7 @@ CEILINGS = {
     "src/**/*.py": (202, 31810),
     "tests/**/*.py": (147, 17260),
     "studies/**/*.py": (83, 8530),
-    "docs/**/*.md": (22, 2710),
+    "docs/**/*.md": (22, 2700),
     "docs/live/*.js": (13, 1490),
 }
 """Files and lines at most. Who raises one says what users gain by it."""
