@@ -34,16 +34,7 @@ def test_another_sign_or_unit_of_the_torque_is_refused(joint, factor, side):
         load(wrong)
 
 
-@pytest.mark.parametrize(
-    ("factor", "guess"), [(1 / 2, "motor's side"), (1 / 4, "motor's side"), (1 / 12, "rotor")]
-)
-def test_the_gear_side_is_guessed(factor, guess):
-    column = PAIRS["torque"][1]
-    with pytest.raises(RecordingError, match=f"as if .*{guess}"):
-        load(tracked().trace.table.with_columns(pl.col(column) * factor))
-
-
-@pytest.mark.parametrize("late", [-2, -1, 1, 2, 3, 5])
+@pytest.mark.parametrize("late", [-1, 1, 3, 5])
 def test_rows_that_are_late_or_early_are_named(late):
     table = tracked().trace.table.with_columns(pl.col(PAIRS["torque"]).shift(late))
     says = f"follows the stated PD {'early' if late < 0 else 'late'}, by .* {abs(late)} of its rows"

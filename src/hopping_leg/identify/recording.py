@@ -19,7 +19,7 @@ import polars as pl
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import RecordingError, UsageError, unknown_name
 from hopping_leg.formats import bag_reader
-from hopping_leg.identify import importers, recording_checks, unit_checks
+from hopping_leg.identify import importers, recording_checks
 from hopping_leg.identify.recording_format import COLUMNS, PAIRS, RecordingMetadata, float_column
 from hopping_leg.io import parse_toml, read_dataclass
 from hopping_leg.trace import Trace, read_parquet
@@ -106,7 +106,7 @@ def make_recording(
     RecordingError says that the table cannot be believed.
     """
     table = _cast(table, COLUMNS, name).with_columns(pl.selectors.float().fill_nan(None))
-    inspection = unit_checks.Inspection(table, metadata, name, names or {})
+    inspection = recording_checks.Inspection(table, metadata, name, names or {})
     recording_checks.check_table(inspection)
     trace, warnings = Trace(inspection.table, header or {}), tuple(inspection.warnings)
     return Recording(trace, inspection.metadata, Path(name).name, digest, warnings)

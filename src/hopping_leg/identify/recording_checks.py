@@ -1,56 +1,104 @@
-"""What the loader rejects, and what it leaves out and warns about.
+"""What the loader rejects, and what it mends or leaves out and warns about.
 
-A check raises, or changes the inspection's table to what can be believed.
+A check raises, or changes the inspection's table to what can be believed. A stated PD says what
+every row's torque must be, k (q* - q) + d (q'* - q') + feed-forward: measured torque over it is 1
+where all is right, and its correlation is highest at the right row.
 """
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NoReturn
 
 import numpy as np
 import polars as pl
 
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.errors import RecordingError
-from hopping_leg.identify import unit_checks
-from hopping_leg.identify.recording_format import MEASURED, PAIRS
-from hopping_leg.identify.unit_checks import FASTEST, Inspection
-from hopping_leg.robot import JOINTS
+from hopping_leg.errors import RecordingError, RobotError
+from hopping_leg.identify.recording_format import MEASURED, PAIRS, RecordingMetadata, float_column
+from hopping_leg.robot import JOINTS, Robot, load_robot
 
 STALL = 2.0
 """A gap between rows of more than this many periods is a stall."""
-TINY, HUGE = 1e-30, 1e30
-"""No sensor gives a magnitude beyond these; uninitialised memory read as a float does."""
-_MOSTLY = 0.1  # share of garbage above which nothing in a column is believed
-_JUMP = 0.05  # step out of rows of zeros, rad, that only a sensor that woke up makes
-_LEAST_ROWS = 20  # rows with a position that a recording needs
-_LEAST_MOTION = 0.02  # motion of the joint that moves more, rad; below it nothing can be identified
-_SMALL_MOTION = 0.5  # below it, rad, positions may be revolutions
+FASTEST = 150.0
+"""Speed of a joint, rad/s, far beyond any leg's motor; degrees per second exceed it."""
+_TURN = 2 * np.pi
+
+
+@dataclass
+class Inspection:
+    """What the checks know; rows in messages are those of the file, the first of data being 0."""
+
+    table: pl.DataFrame
+    """In a recording's columns and types; null where nothing was recorded."""
+    metadata: RecordingMetadata
+    origin: str
+    """The file, for messages."""
+    names: Mapping[str, str]
+    """The file's own column for a recording's column, where they differ."""
+    warnings: list[str] = field(default_factory=list)
+    """What was strange so far, a sentence each."""
+
+    @cached_property
+    def robot(self) -> Robot | None:
+        """The robot that the recording is filed under, None if it is not here."""
+        try:
+            return load_robot(self.metadata.robot)
+        except (RobotError, OSError):
+            return None
+
+    def named(self, column: str) -> str:
+        """Return a column as the file calls it, in quotes."""
+        own = self.names.get(column, column)
+        return f"column '{own}'" if own == column else f"column '{own}' ({column})"
+
+    def row(self, index: int) -> int:
+        """Return the file's row of a row of the table."""
+        return int(self.table["row"][int(index)]) if "row" in self.table.columns else int(index)
+
+    def floats(self, column: str) -> Array:
+        """Return a column as floats, (ticks,), NaN where null."""
+        return float_column(self.table, column)
+
+    def refuse(self, sentence: str) -> NoReturn:
+        """Refuse the file."""
+        raise RecordingError(f"{self.origin}: {sentence}.")
+
+    def warn(self, sentence: str) -> None:
+        """Note something strange."""
+        self.warnings.append(f"{self.origin}: {sentence}.")
+
+    def set(self, column: str, values: Array) -> None:
+        """Give a column other values, (ticks,); NaN stands for nothing."""
+        self.table = self.table.with_columns(pl.Series(column, values).fill_nan(None))
 
 
 def check_table(inspection: Inspection) -> None:
     """Leave what can be believed in the table, warn of the rest, or raise RecordingError."""
     if inspection.table.height == 0:
-        raise RecordingError(f"{inspection.origin} has no rows below its header; record again.")
+        inspection.refuse("there are no rows below its header; record again")
     if "time_s" not in inspection.table.columns:
-        raise RecordingError(
-            f"{inspection.origin} has no column 'time_s'; a recording needs time and position."
-        )
+        inspection.refuse("there is no column 'time_s'; a recording needs time and position")
     _check_clock(inspection)
     _drop_garbage(inspection)
     _drop_startup(inspection)
     _align_commands(inspection)
-    _mend_angles(inspection)
-    unit_checks.check_units(inspection)
+    _unwrap_angles(inspection)
+    for quantity in _FAR:
+        for column in PAIRS[quantity]:
+            _drop_spikes(inspection, column, *_FAR[quantity])
+    _check_sizes(inspection)
     _check_motion(inspection)
-    _check_angles(inspection)
-    unit_checks.check_velocity(inspection)
-    unit_checks.check_torque(inspection)
+    _check_jumps(inspection)
+    for placed, moving in zip(PAIRS["position"], PAIRS["velocity"], strict=True):
+        _check_velocity(inspection, placed, moving)
+    for joint in range(2):
+        _check_torque(inspection, joint)
     _warn_of_stalls(inspection)
 
 
-_TIME_UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1 / 60}
 _SPARSEST = 20.0  # periods per row beyond which the rate or the time's unit must be wrong
-_DAY = 86400.0
-_COUNTERS = [2.0**bits * 10.0**-n for bits in (16, 24, 31, 32) for n in (9, 6, 3, 0)] + [_DAY]
+_COUNTERS = [2.0**bits * 10.0**-n for bits in (16, 24, 31, 32) for n in (9, 6, 3, 0)] + [86400.0]
 """Where counters of nanoseconds to seconds begin anew, and the time of day, s."""
 _SOON = 5.0  # usual steps within which a wrapped clock goes on
 _ALIKE = 0.01  # periods within which two steps are one
@@ -63,16 +111,11 @@ def row_period(time: Array, period: float) -> float:
 
 
 def _check_clock(inspection: Inspection) -> None:
-    """Refuse time that is missing, not increasing, too coarse or in another unit.
-
-    A counter that wrapped goes on.
-    """
+    """Refuse time that is missing, not increasing, too coarse or in another unit."""
     time, where = inspection.floats("time_s"), inspection.named("time_s")
     bad = np.flatnonzero(~np.isfinite(time))
     if len(bad):
-        inspection.refuse(
-            f"{where} has no time in row {inspection.row(bad[0])}; every row needs one."
-        )
+        inspection.refuse(f"{where} has no time in row {inspection.row(bad[0])}")
     _unwrap_time(inspection, time)
     steps, metadata = np.diff(time), inspection.metadata
     if not len(steps):
@@ -81,34 +124,26 @@ def _check_clock(inspection: Inspection) -> None:
     if tick > _COARSE * metadata.period:
         sentence = f"{where} is too coarse: it counts in {tick * 1e3:.4g} ms, where a row takes"
         sentence += f" {metadata.period * 1e3:.4g}; record it to a tenth of that"
-        if tick > _USELESS * metadata.period:
-            inspection.refuse(f"{sentence}.")
-        inspection.warn(sentence)
+        (inspection.refuse if tick > _USELESS * metadata.period else inspection.warn)(sentence)
     back = np.flatnonzero(steps <= 0)
     if len(back):
         index = back[0] + 1
         inspection.refuse(
-            f"{where} does not increase in row {inspection.row(index)}:"
-            f" {time[index]:.9g} s comes after {time[index - 1]:.9g} s; remove the row, or split"
-            " the file where a new log begins."
+            f"{where} does not increase in row {inspection.row(index)}: {time[index]:.9g} s comes"
+            f" after {time[index - 1]:.9g} s; remove the row, or split the file there"
         )
     step = float(np.median(steps))
-    periods = step * metadata.rate_hz
-    if not 0.5 <= periods <= _SPARSEST:
-        unit = next((u for u, f in _TIME_UNITS.items() if 0.8 < periods / f < 1.25), None)
-        guess = f"the time seems to be in {unit}" if unit else "one of the two is wrong"
+    if not 0.5 <= step * metadata.rate_hz <= _SPARSEST:
         inspection.refuse(
             f"{where} steps by {step:.3g} from row to row but the metadata's rate_hz ="
-            f" {metadata.rate_hz:g} means {metadata.period:.3g} s; {guess}."
+            f" {metadata.rate_hz:g} means {metadata.period:.3g} s; one of the two is wrong"
         )
 
 
 def _unwrap_time(inspection: Inspection, time: Array) -> None:
     """Let time, (ticks,), go on where its counter began anew."""
     steps = np.diff(time)
-    if not (steps > 0).any():
-        return
-    usual = float(np.median(steps[steps > 0]))
+    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     wraps: list[str] = []
     for index in np.flatnonzero(steps < 0).tolist():
         turns = [c for c in _COUNTERS if 0 < steps[index] + c < _SOON * usual]
@@ -135,17 +170,21 @@ def _tick(steps: Array, period: float) -> float:
 
 def _warn_of_stalls(inspection: Inspection) -> None:
     """Say where rows are missing; windows do not reach across."""
-    time, where = inspection.floats("time_s"), inspection.named("time_s")
+    time = inspection.floats("time_s")
     steps, period = np.diff(time), row_period(time, inspection.metadata.period)
     stalls = np.flatnonzero(steps > STALL * period)
     for stall in stalls[:3]:
         inspection.warn(
-            f"{where}: stall of {steps[stall] * 1e3:.1f} ms, {steps[stall] / period:.1f} periods,"
-            f" before row {inspection.row(stall + 1)}"
+            f"{inspection.named('time_s')}: stall of {steps[stall] * 1e3:.1f} ms,"
+            f" {steps[stall] / period:.1f} periods, before row {inspection.row(stall + 1)}"
         )
     if len(stalls) > 3:
-        last = inspection.row(stalls[-1] + 1)
-        inspection.warn(f"{where}: {len(stalls) - 3} further stalls, the last before row {last}")
+        inspection.warn(f"{inspection.named('time_s')}: {len(stalls) - 3} further stalls")
+
+
+_TINY, _HUGE = 1e-30, 1e30  # uninitialised memory read as a float is beyond, no sensor's value is
+_MOSTLY = 0.1  # share of garbage above which nothing in a column is believed
+_WOKEN = 0.05  # step out of rows of zeros, rad, that only a sensor that woke up makes
 
 
 def _drop_garbage(inspection: Inspection) -> None:
@@ -153,18 +192,17 @@ def _drop_garbage(inspection: Inspection) -> None:
     for column in inspection.table.select(pl.selectors.float()).columns:
         values = inspection.floats(column)
         size = np.abs(values)
-        garbage = ((size > 0) & (size < TINY)) | (size > HUGE)
-        if not garbage.any():
-            continue
-        first, most = int(np.argmax(garbage)), garbage.mean() > _MOSTLY
-        inspection.warn(
-            f"{inspection.named(column)}, row {inspection.row(first)}:"
-            f" {values[first]:.3g} is no measurement but uninitialised memory"
-            f" ({int(garbage.sum())} such values);{' the column is' if most else ''} left out"
-        )
-        inspection.set(column, np.where(garbage | most, np.nan, values))
-    joints = "torque_command" if inspection.metadata.onboard == "torque" else "position_command"
-    for column in (*MEASURED, *PAIRS[joints]):
+        garbage = ((size > 0) & (size < _TINY)) | (size > _HUGE)
+        if garbage.any():
+            first, most = int(np.argmax(garbage)), garbage.mean() > _MOSTLY
+            inspection.warn(
+                f"{inspection.named(column)}, row {inspection.row(first)}:"
+                f" {values[first]:.3g} is no measurement but uninitialised memory"
+                f" ({int(garbage.sum())} such values);{' the column is' if most else ''} left out"
+            )
+            inspection.set(column, np.where(garbage | most, np.nan, values))
+    asked = "torque_command" if inspection.metadata.onboard == "torque" else "position_command"
+    for column in (*MEASURED, *PAIRS[asked]):
         values = inspection.floats(column)
         if np.isnan(values).all() or np.nanmax(np.abs(values)) > 0:
             continue
@@ -177,45 +215,38 @@ def _drop_garbage(inspection: Inspection) -> None:
 
 
 def _drop_startup(inspection: Inspection) -> None:
+    """Leave out the rows before commands were applied, or before the sensors woke up."""
     known, already = inspection.metadata.startup_rows, inspection.row(0)
     if known and already:
         return  # saved again after they were left out
-    rows, reason = max(
-        (min(known, inspection.table.height), "the rig's start-up"),
-        (_asleep(inspection), "all joints read zero, then jump"),
-        key=lambda found: found[0],
-    )
-    if rows:
-        pairs = PAIRS["torque_command"] + PAIRS["position"]
-        present = [c for c in pairs if c in inspection.table.columns]
-        inspection.warn(
-            f"rows {already} to {inspection.row(rows - 1)} are start-up rows ({reason};"
-            f" {', '.join(map(inspection.named, present[:2]))}); left out"
-        )
-    inspection.table = inspection.table.slice(rows)
-
-
-def _asleep(inspection: Inspection) -> int:
-    """Return the rows before the sensors woke up."""
     q = np.stack([inspection.floats(c) for c in PAIRS["position"]], axis=-1)
-    awake = np.flatnonzero((np.nan_to_num(q) != 0).any(axis=-1))
-    if not len(awake) or awake[0] == 0 or awake[0] > len(q) // 2:
-        return 0
-    return int(awake[0]) if np.nanmax(np.abs(q[awake[0]])) > _JUMP else 0
+    awake = int(np.argmax((np.nan_to_num(q) != 0).any(axis=-1)))
+    asleep = awake if awake <= len(q) // 2 and np.abs(q[awake]).max(initial=0) > _WOKEN else 0
+    rows = max(min(known, len(q)), asleep)
+    if rows:
+        inspection.warn(
+            f"rows {already} to {inspection.row(rows - 1)} are start-up rows"
+            f" ({'all joints read zero, then jump' if asleep > known else 'as stated'}); left out"
+        )
+        inspection.table = inspection.table.slice(rows)
 
 
 def _align_commands(inspection: Inspection) -> None:
     """Put each command beside the state before it acted; the last row's is unknown."""
-    if inspection.metadata.sample == "before-command":
-        return
-    inspection.metadata = replace(inspection.metadata, sample="before-command")
-    commands = [c for q in PAIRS if q.endswith("_command") for c in PAIRS[q]]
-    commands += [*PAIRS["stiffness"], *PAIRS["damping"]]
-    later = [pl.col(c).shift(-1) for c in commands if c in inspection.table.columns]
-    inspection.table = inspection.table.with_columns(later)[:-1]
+    if inspection.metadata.sample == "after-command":
+        inspection.metadata = replace(inspection.metadata, sample="before-command")
+        names = [q for q in PAIRS if q.endswith("_command")] + ["stiffness", "damping"]
+        present = [c for q in names for c in PAIRS[q] if c in inspection.table.columns]
+        inspection.table = inspection.table.with_columns(pl.col(present).shift(-1))[:-1]
+
+
+_LEAST_ROWS = 20  # rows with a position that a recording needs
+_LEAST_MOTION = 0.02  # motion of the joint that moves more, rad; below it nothing can be identified
+_SMALL_MOTION = 0.5  # below it, rad, positions may be revolutions
 
 
 def _check_motion(inspection: Inspection) -> None:
+    """Refuse recordings that are too short or at rest, and say which joint was not recorded."""
     spans = {}
     for column in PAIRS["position"]:
         values = inspection.floats(column)
@@ -224,17 +255,16 @@ def _check_motion(inspection: Inspection) -> None:
             spans[column] = float(np.nanmax(values) - np.nanmin(values))
         elif not known:
             inspection.warn(f"{inspection.named(column)} was not recorded")
-    origin = inspection.origin
     if not spans:
-        raise RecordingError(
-            f"{origin} is too short: {inspection.table.height} rows, and no joint has {_LEAST_ROWS}"
-            f" positions ({' or '.join(map(inspection.named, PAIRS['position']))})."
+        inspection.refuse(
+            f"it is too short: {inspection.table.height} rows, and no joint has {_LEAST_ROWS}"
+            f" positions ({' or '.join(map(inspection.named, PAIRS['position']))})"
         )
     widest = max(spans, key=spans.__getitem__)
     if spans[widest] < _LEAST_MOTION:
-        raise RecordingError(
-            f"{origin} is at rest: {inspection.named(widest)} spans {spans[widest]:.2g} rad;"
-            f" nothing can be identified below {_LEAST_MOTION:g} rad, play an excitation."
+        inspection.refuse(
+            f"the leg is at rest: {inspection.named(widest)} spans {spans[widest]:.2g} rad;"
+            f" nothing can be identified below {_LEAST_MOTION:g} rad, play an excitation"
         )
     if spans[widest] < _SMALL_MOTION:
         inspection.warn(
@@ -243,7 +273,6 @@ def _check_motion(inspection: Inspection) -> None:
         )
 
 
-_TURN = 2 * np.pi
 _NEAR = 0.02  # s, within which no joint turns by half a turn
 _QUICK = 50.0  # speed that a joint may have while its angle wraps, rad/s
 _SHORT = 3  # rows that a spike lasts at most
@@ -260,8 +289,8 @@ def _steps(inspection: Inspection, column: str) -> tuple[IntArray, Array, Array]
     return known, np.diff(values[known]), np.diff(inspection.floats("time_s")[known])
 
 
-def _mend_angles(inspection: Inspection) -> None:
-    """Let wrapped angles go on; leave out what leads far away and back at once."""
+def _unwrap_angles(inspection: Inspection) -> None:
+    """Let wrapped angles go on."""
     for column in (*PAIRS["position"], *PAIRS["position_command"]):
         known, steps, times = _steps(inspection, column)
         turns = np.where(times < _NEAR, np.round(steps / _TURN), 0.0)
@@ -274,12 +303,10 @@ def _mend_angles(inspection: Inspection) -> None:
                 f"{inspection.named(column)} wraps {np.count_nonzero(turns)} times, first before"
                 f" row {inspection.row(known[np.argmax(turns != 0) + 1])}; it was made to go on"
             )
-    for quantity in _FAR:
-        for column in PAIRS[quantity]:
-            _drop_spikes(inspection, column, *_FAR[quantity])
 
 
 def _drop_spikes(inspection: Inspection, column: str, least: float, often: float) -> None:
+    """Leave out what leads far away and back at once."""
     known, steps, times = _steps(inspection, column)
     if len(known) < _LEAST_ROWS:
         return
@@ -305,7 +332,7 @@ def _drop_spikes(inspection: Inspection, column: str, least: float, often: float
         inspection.set(column, values)
 
 
-def _check_angles(inspection: Inspection) -> None:
+def _check_jumps(inspection: Inspection) -> None:
     """Refuse angles that jump, or are beyond the robot's mechanical stops."""
     for name, column in zip(JOINTS, PAIRS["position"], strict=True):
         known, steps, times = _steps(inspection, column)
@@ -314,17 +341,203 @@ def _check_angles(inspection: Inspection) -> None:
             inspection.refuse(
                 f"{inspection.named(column)} jumps by {steps[leaps[0]]:.3g} rad before row"
                 f" {inspection.row(known[leaps[0] + 1])} ({len(leaps)} such jumps): its counter"
-                " wraps, or the encoder lost its place; make it go on, or split the file there."
+                " wraps, or the encoder lost its place; make it go on, or split the file there"
             )
         if (robot := inspection.robot) is None:
             continue
-        joint_of, q = getattr(robot, name), inspection.floats(column)
-        low, high = joint_of.stop_lower - _OUTSIDE, joint_of.stop_upper + _OUTSIDE
+        joint, q = getattr(robot, name), inspection.floats(column)
+        low, high = joint.stop_lower - _OUTSIDE, joint.stop_upper + _OUTSIDE
         beyond = np.flatnonzero((q < low) | (q > high))
         if len(beyond) and high - low < _TURN:
             inspection.refuse(
                 f"{inspection.named(column)} is {q[beyond[0]]:.3g} rad in row"
                 f" {inspection.row(beyond[0])}, but the {name} of '{robot.name}' ends at"
-                f" {joint_of.stop_lower:g} and {joint_of.stop_upper:g}; is its sign or zero"
+                f" {joint.stop_lower:g} and {joint.stop_upper:g}; is its sign or zero"
                 " another, or is it another robot's?"
             )
+
+
+_COMMON_PEAK = 60.0  # peak torque where the robot is unknown, N m
+_SIZES = {
+    "position": (12.5, "rad", "degrees"),  # two turns from the middle
+    "velocity": (FASTEST, "rad/s", "degrees/s"),
+    "torque": (5.0, "N m", "mN m"),  # times the motor's peak
+}
+"""The largest magnitude of a quantity in its unit, and what exceeds it."""
+_HIGHEST = 5.0  # base height, m; millimetres exceed it
+
+
+def _check_sizes(inspection: Inspection) -> None:
+    """Refuse positions, speeds, torques and heights that cannot be rad, rad/s, N m and m."""
+    peaks = [_COMMON_PEAK] * 2
+    if (robot := inspection.robot) is not None:
+        peaks = [j.motor.peak_torque * j.belt_ratio for j in (robot.hip, robot.knee)]
+    columns = {"height_m": (_HIGHEST, "m", "mm"), "base_rise_m": (_HIGHEST, "m", "mm")}
+    for quantity, (most, *units) in _SIZES.items():
+        for name in (quantity, f"{quantity}_command"):
+            for column, peak in zip(PAIRS[name], peaks, strict=True):
+                columns[column] = (most * peak if quantity == "torque" else most, *units)
+    for column, (most, unit, guess) in columns.items():
+        values = inspection.floats(column)
+        if np.isnan(values).all():
+            continue
+        middle = (np.nanmax(values) + np.nanmin(values)) / 2 if unit == "rad" else 0.0
+        worst = int(np.nanargmax(np.abs(values - middle)))
+        if abs(values[worst] - middle) > most:
+            inspection.refuse(
+                f"{inspection.named(column)} cannot be in {unit}: row {inspection.row(worst)} holds"
+                f" {values[worst]:.4g}; is it in {guess}? Convert it"
+            )
+
+
+_FACTORS = (180 / np.pi, 1 / _TURN, np.pi / 180, _TURN, _TURN / 60)
+"""Way over integral of a velocity in degrees, revolutions or rpm, or of such positions."""
+_LIKE = 0.9  # correlation above which a velocity is the derivative, maybe in another unit
+_OFF = 0.25  # share by which it may be another all the same: sparse logs are interpolated
+_BLOCK = 0.05  # integration of velocity, s; shorter blocks would compare quantisation
+_LEAST_BLOCKS = 20
+_LEAST_WAY = 5e-3  # root mean square way within a block below which nothing can be said, rad
+_GAP = 0.2  # longest time between two velocities that is integrated across, s
+
+
+def _check_velocity(inspection: Inspection, placed: str, moving: str) -> None:
+    """Leave out a velocity that is not the derivative of its position; refuse other units."""
+    compared = _way_and_integral(inspection, placed, moving)
+    if compared is None:
+        return
+    way, integral = compared
+    power, both = float(integral @ integral), float(integral @ way)
+    if not power:
+        return
+    factor, alike = both / power, both / float(np.sqrt(power * (way @ way)))
+    found = f"(way over integral {factor:.3g}, correlation {alike:.2f})"
+    if alike >= _LIKE and any(abs(factor / f - 1) < 0.1 for f in _FACTORS):
+        inspection.refuse(
+            f"{inspection.named(placed)} or {inspection.named(moving)} seems to be in degrees,"
+            f" revolutions or rpm {found}; convert to rad and rad/s"
+        )
+    if abs(factor - 1) > _OFF or alike < _LIKE:
+        inspection.warn(
+            f"{inspection.named(moving)} is not the derivative of {inspection.named(placed)}"
+            f" {found}; left out"
+        )
+        inspection.set(moving, np.full(inspection.table.height, np.nan))
+
+
+def _way_and_integral(
+    inspection: Inspection, placed: str, moving: str
+) -> tuple[Array, Array] | None:
+    """Return ways in blocks of time and the integrals of velocity there; None if too few tell."""
+    time, position, velocity = map(inspection.floats, ("time_s", placed, moving))
+    moves = np.flatnonzero(~np.isnan(velocity))
+    if len(moves) < 2:
+        return None
+    filled = np.interp(time, time[moves], velocity[moves])
+    integral = np.append(0.0, np.cumsum((filled[1:] + filled[:-1]) / 2 * np.diff(time)))
+    runs = np.append(0, np.cumsum(np.diff(time[moves]) > _GAP))
+    known = np.flatnonzero(~np.isnan(position))
+    known = known[(known >= moves[0]) & (known <= moves[-1])]
+    run = runs[np.searchsorted(moves, known, side="right") - 1]
+    late = np.searchsorted(time[known], time[known] + _BLOCK)
+    early = np.flatnonzero(late < len(known))
+    late = late[early]
+    whole = (run[late] == run[early]) & (time[known[late]] - time[known[early]] < 2 * _BLOCK)
+    begin, end = known[early[whole]], known[late[whole]]
+    way, expected = position[end] - position[begin], integral[end] - integral[begin]
+    if len(way) < _LEAST_BLOCKS or np.sqrt(np.mean(way**2)) < _LEAST_WAY:
+        return None
+    return way, expected
+
+
+_LEAST_TORQUES = 50
+_LEAST_TORQUE = 0.1  # rms, N m, of what is asked for, below which noise rules
+_ALIKE_TORQUE, _STRANGE, _OPPOSED = 0.9, 0.6, -0.5
+"""Correlations from which on torques are one, and up to which they are strangers or opposed."""
+_CLEARER = 0.5  # share of what a row leaves unexplained that another one must stay below
+_LATEST = 10  # rows by which torques are searched for
+_TOO_LATE = 0.02  # s, longer than any drive takes
+_RATIOS = {False: (0.75, 1.33), True: (0.4, 2.5)}
+"""Measured torque over what a stated PD asks for, or, true, a torque command."""
+
+
+def _check_torque(inspection: Inspection, joint: int) -> None:
+    """Refuse a torque that contradicts what was asked for; doubt one that comes late."""
+    metadata, named = inspection.metadata, inspection.named(PAIRS["torque"][joint])
+    commanded = metadata.onboard == "torque"
+    right = 1 if metadata.onboard == "zoh" else 0
+    asked, measured = _asked(inspection, joint), inspection.floats(PAIRS["torque"][joint])
+    rows = {late: _compare(asked, measured, late) for late in range(-1, _LATEST)}
+    found = {late: pair for late, pair in rows.items() if pair is not None}
+    if right not in found:
+        return
+    best = max(found, key=lambda late: abs(found[late][1]))
+    ((least, most), correlation), own = found[best], found[right][1]
+    if correlation < _OPPOSED:
+        inspection.refuse(
+            f"{named} has the opposite sign of what was asked for (correlation {correlation:.2f});"
+            " a positive torque accelerates towards positive angles, turn its sign round"
+        )
+    exact, (low, high) = commanded or metadata.gains_exact, _RATIOS[commanded]
+    if exact and correlation > _ALIKE_TORQUE and not (least < high and most > low):
+        inspection.refuse(
+            f"{named} is {np.sqrt(abs(least * most)):.3g} times what was asked for, maybe in"
+            " amperes, at the motor's side of a gear or belt, or with other gains; give torques in"
+            " N m at the joint, and gains likewise"
+        )
+    if commanded or not exact:
+        return
+    if correlation < _STRANGE:
+        inspection.refuse(
+            f"{named} does not follow the stated PD (correlation {correlation:.2f}); check"
+            " 'stiffness', 'damping', 'onboard', 'sample' and the columns"
+        )
+    late = best - right
+    if late and 1 - correlation**2 < _CLEARER * (1 - own**2):
+        sentence = (
+            f"{named} follows the stated PD {'late' if late > 0 else 'early'}, by"
+            f" {abs(late) * metadata.period * 1e3:.3g} ms or {abs(late)} of its rows"
+            f" (correlation {correlation:.3f}, {own:.3f} at its own row); move the column"
+        )
+        if late < 0 or late * metadata.period >= _TOO_LATE:
+            inspection.refuse(f"{sentence}, or check 'sample' and 'onboard'")
+        inspection.warn(f"{sentence} unless the drives take that long")
+
+
+def _asked(inspection: Inspection, joint: int) -> Array:
+    """Return the torque that every row's state and command ask for, (ticks,), NaN if unknown."""
+    metadata = inspection.metadata
+
+    def column(name: str) -> Array:
+        return inspection.floats(PAIRS[name][joint])
+
+    if metadata.onboard == "torque":
+        return column("torque_command")
+    stiffness, damping = (
+        np.where(np.isnan(column(name)), (pair or (np.nan, np.nan))[joint], column(name))
+        for name, pair in (("stiffness", metadata.stiffness), ("damping", metadata.damping))
+    )
+    rate, forward = (np.nan_to_num(column(f"{name}_command")) for name in ("velocity", "torque"))
+    position = column("position_command")
+    if metadata.onboard == "continuous":  # a row's torque is from its state and the last command
+        position, rate, forward = (np.append(np.nan, v[:-1]) for v in (position, rate, forward))
+    asked: Array = stiffness * (position - column("position")) + forward
+    return asked + damping * (rate - column("velocity"))
+
+
+def _compare(asked: Array, measured: Array, late: int) -> tuple[tuple[float, float], float] | None:
+    """Return measured over asked, least and most, and their correlation at rows that are late.
+
+    Errors of what is asked for pull its regression towards zero, those of what is measured the
+    inverse one away from it: the truth is between.
+    """
+    x = asked[max(-late, 0) : len(asked) - max(late, 0)]
+    y = measured[max(late, 0) : len(measured) - max(-late, 0)]
+    known = ~np.isnan(x + y)
+    x, y = x[known], y[known]
+    if len(x) < _LEAST_TORQUES or np.sqrt(np.mean(x**2)) < _LEAST_TORQUE or not y.any():
+        return None
+    small = np.abs(x) <= np.median(np.abs(x))  # larger ones may be beyond what a motor gives
+    asked_power, both, power = x[small] @ x[small], x[small] @ y[small], y[small] @ y[small]
+    least = float(both / max(asked_power, 1e-12))
+    most = float(power / both) if both > 0 else least
+    return (least, most), float(x @ y) / float(np.sqrt((x @ x) * (y @ y)))
