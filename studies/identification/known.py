@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hopping_leg.identify.optimizers import CmaOptions, SearchOptions
+from hopping_leg.identify.optimizers import SearchOptions
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import Recording
@@ -97,7 +97,7 @@ def fit(
     ``unseen`` recordings judge the fit, ``truth`` is what differs from where it begins; without
     parameters the plan decides what is fitted.
     """
-    effort = SearchOptions(cma=CmaOptions(study.generations, study.population))
+    effort = SearchOptions(generations=study.generations, population=study.population)
     options = IdentifyOptions(parameters, search=method, effort=effort, threads=study.threads)
     judges = list(unseen.values())
     identified, took = timed(

@@ -33,7 +33,7 @@ FIRST_SEED = 1000
 _BOTH_SWINGS = 120.0
 """Recordings of so many seconds have room for both swing periods of the paper."""
 
-_USUAL_FIT = optimizers.LeastSquaresOptions(tolerance=1e-3)
+_USUAL_TOLERANCE = 1e-3
 """A round that lowers the cost by a smaller share ends the search."""
 
 _INERTIA_FACTOR = 10.0
@@ -95,9 +95,7 @@ def _fit_options(
     options = IdentifyOptions(
         bounds={k: (v / _INERTIA_FACTOR, v * _INERTIA_FACTOR) for k, v in links.items()},
         search=search,
-        effort=optimizers.SearchOptions(
-            least_squares=_USUAL_FIT, cma=optimizers.CmaOptions(generations=generations)
-        ),
+        effort=optimizers.SearchOptions(tolerance=_USUAL_TOLERANCE, generations=generations),
     )
     if search != "one-pass":
         return options

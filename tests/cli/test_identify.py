@@ -103,7 +103,7 @@ def write_bad(folder):
     [
         ([], "No recording was named"),
         (["none.csv"], "There is no recording"),
-        (["empty.csv"], "empty.csv is empty"),
+        (["empty.csv"], "empty.csv is no whole table"),
         (["noise.csv"], "noise.csv is neither Parquet nor a CSV"),
         (["trace.parquet"], "is of no known rig"),
         (["short.csv"], "short.csv is too short"),

@@ -2,17 +2,14 @@
 
 import functools
 
-from hopping_leg.identify.optimizers import CmaOptions, LeastSquaresOptions, SearchOptions
+from hopping_leg.identify.optimizers import SearchOptions
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from tests.identify.twin import LEG, record, swing
 
 TRUTH = {"hip.friction": 0.12, "knee.damping": 0.06}
 TWIN = LegHypothesis(LEG).replace(TRUTH).robot
-EFFORT = SearchOptions(
-    cma=CmaOptions(generations=4, population=4),
-    least_squares=LeastSquaresOptions(rounds=2, evaluations=3),
-)
+EFFORT = SearchOptions(rounds=2, evaluations=3, generations=4, population=4)
 RATE = 100.0
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from hopping_leg.identify.cost import Objective, Scoring
 from hopping_leg.identify.parameters import LegHypothesis, choose
-from hopping_leg.identify.windows import cut
+from hopping_leg.identify.simulate import cut
 from tests.identify.twin import LEG, STEP, record, swing
 
 CAD = LegHypothesis(LEG)

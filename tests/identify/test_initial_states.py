@@ -7,9 +7,8 @@ from hopping_leg.identify.initial_states import OffsetFinder, base_rate, full_st
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import make_recording
 from hopping_leg.identify.recording_format import PAIRS
-from hopping_leg.identify.simulate import WindowSimulator
+from hopping_leg.identify.simulate import WindowSimulator, cut
 from hopping_leg.identify.validation import open_loop
-from hopping_leg.identify.windows import cut, part
 from hopping_leg.robot import kinematics, load_robot
 from tests.identify.twin import FINE, LEG, STEP, changed, noisy, record, rig_model, swing
 
@@ -96,7 +95,7 @@ def test_simulations_show_what_the_encoders_show():
 
 
 def test_what_tells_the_zeros_is_not_predicted():
-    first = part(ZEROED, 0, 550)
+    first = ZEROED.part(0, 550)
     assert np.isnan(open_loop([first], TRUE, 0.2, STEP)).all()
     assert max(open_loop([ZEROED], TRUE, 0.2, STEP)) < 2e-3
 

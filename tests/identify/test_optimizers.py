@@ -6,13 +6,14 @@ import pytest
 
 from hopping_leg.identify.cost import Scoring
 from hopping_leg.identify.optimizers import (
-    CmaOptions,
     Found,
-    Searcher,
+    Pass,
     SearchOptions,
     cma_es,
+    deal,
     jacobian,
     least_squares,
+    search,
     second_pass,
 )
 from hopping_leg.identify.parameters import choose
@@ -26,10 +27,12 @@ def squares(vectors):
 
 
 def test_cma_es_finds_the_bottom_of_a_bowl_and_by_shares_ends_where_they_agree():
-    found = cma_es(squares, TWO, CmaOptions(60), seed=3)
+    found = cma_es(squares, TWO, SearchOptions(generations=60), seed=3)
     np.testing.assert_allclose(found.vector, BOTTOM, atol=1e-4)
     assert found.history == sorted(found.history, reverse=True)
-    shared = cma_es(squares, TWO, CmaOptions(500), seed=3, shares=[lambda v: squares(v) / 2] * 2)
+    shared = cma_es(
+        squares, TWO, SearchOptions(generations=500), seed=3, shares=[lambda v: squares(v) / 2] * 2
+    )
     assert len(shared.history) < 100
     np.testing.assert_allclose(shared.vector, BOTTOM, atol=3e-3)
 
@@ -45,7 +48,7 @@ def sum_of_shares(vectors):
 
 
 def test_shares_in_turn_find_the_bottom_of_their_sum():
-    found = cma_es(sum_of_shares, TWO, CmaOptions(80), seed=3, shares=SHARES)
+    found = cma_es(sum_of_shares, TWO, SearchOptions(generations=80), seed=3, shares=SHARES)
     assert found.cost == sum_of_shares(found.vector[None])[0] == found.history[-1]
     own = sum_of_shares(SHIFTS + BOTTOM)
     (least,) = sum_of_shares(BOTTOM[None])
@@ -57,9 +60,7 @@ def test_differences_stay_inside_the_bounds(groups):
     low, high = TWO.bounds
     for start in (low, high, 0.5 * (low + high)):
         seen = []
-        slopes = jacobian(
-            lambda v, s=seen: s.append(v) or bowl(v), start, (low, high), 1e-3, groups
-        )
+        slopes = jacobian(lambda v, s=seen: s.append(v) or bowl(v), start, (low, high), groups)
         assert (np.concatenate(seen) >= low).all()
         assert (np.concatenate(seen) <= high).all()
         np.testing.assert_allclose(slopes, np.array([[2.0, 0.3], [0.1, 1.0]]).T, rtol=1e-6)
@@ -74,9 +75,9 @@ def test_slopes_do_not_take_a_jump_for_a_slope():
         return np.concatenate([3 * vectors + jump, 2 * vectors], axis=1)
 
     for start in (0.0, 3e-4, 1.0, -1.0):
-        slopes = jacobian(jumping, np.array([start]), bounds, 1e-3, groups)
+        slopes = jacobian(jumping, np.array([start]), bounds, groups)
         np.testing.assert_allclose(slopes, [[3.0], [2.0]], rtol=1e-6)
-    assert jacobian(jumping, np.zeros(1), bounds, 1e-3)[0, 0] > 100
+    assert jacobian(jumping, np.zeros(1), bounds)[0, 0] > 100
 
 
 def test_a_recording_that_the_model_cannot_explain_hardly_moves_the_estimate():
@@ -100,7 +101,7 @@ def test_steps_follow_the_slope_of_the_levelled_cost():
     residuals = goal.residuals(vector[None])[0]
     weights = goal.loss.weights(residuals)
     assert weights.min() < 0.1
-    slopes = jacobian(goal.residuals, vector, TWO.bounds, 1e-4)
+    slopes = jacobian(goal.residuals, vector, TWO.bounds, step=1e-4)
     expected = (goal(vector + shift) - goal(vector - shift)) / 2e-4
     np.testing.assert_allclose(2 * (weights**2 * residuals) @ slopes, expected, rtol=1e-3)
 
@@ -116,17 +117,26 @@ def test_an_objective_that_was_used_can_be_sent():
 
 
 def test_the_second_pass_stays_near_the_first():
-    rigs = ["fixed-base", "rail"]
-    first = choose(CAD, pass_names(rigs)[0])
-    assert "thigh.inertia" not in first.names
+    names, added = pass_names(["fixed-base", "rail"])
+    first, every = choose(CAD, names), choose(CAD, names + added)
     vector = np.clip(np.ones(len(first.names)), *first.bounds)
-    second = second_pass(first, Found(vector, 1.0, 1, []), rigs, {}, {})
-    assert {"thigh.inertia", "contact.time_constant", "rail.damping"} <= set(second.names)
+    second = second_pass(every, Pass("first", first, Found(vector, 1.0, 1, [])))
+    assert second.names == every.names
     found = dict(zip(first.names, first.values(vector), strict=True))
     for p in second.parameters:
         if p.name in found:
             assert p.start == pytest.approx(found[p.name])
             assert p.low == 0 or p.low >= 0.49 * p.start - p.scale
+
+
+def test_dealt_windows_are_all_there_and_every_share_is_spread_over_them():
+    goal = objective(length=0.1)
+    shares = deal(goal, 0.5, np.random.default_rng(0))
+    assert sorted((w for share in shares for w in share), key=lambda w: w.start) == [*goal.windows]
+    for share in shares:
+        assert [w.start // 80 for w in share] == list(range(len(share)))
+        assert len({w.start % 80 for w in share}) > 1
+    assert deal(goal, 3.0, np.random.default_rng(0)) == []
 
 
 def test_shares_of_the_windows_find_more_in_the_same_time():
@@ -135,9 +145,8 @@ def test_shares_of_the_windows_find_more_in_the_same_time():
     plan = make_plan([run], LEG, parameters=tuple(TRUTH), search="cma")
     ends = []
     for generations, seconds in ((5, np.inf), (20, 0.5)):
-        options = SearchOptions(cma=CmaOptions(generations, 10, seconds=seconds))
-        searcher = Searcher(plan, goal, options)
-        ends.append(searcher.run()[0].found)
+        options = SearchOptions(generations=generations, population=10, seconds=seconds)
+        ends.append(search(plan, goal, options)[0].found)
     whole, shared = ends
     assert shared.cost == goal(shared.vector[None])[0]
     assert shared.cost < 0.5 * whole.cost

@@ -8,7 +8,6 @@ import pytest
 
 from hopping_leg.errors import PhysicsError, RecordingError, RobotError
 from hopping_leg.identify import pipeline
-from hopping_leg.identify.optimizers import SearchOptions
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import identify
 from hopping_leg.identify.plan import make_plan
@@ -43,7 +42,7 @@ def test_recordings_to_judge_by_replace_the_split_and_nobody_believes_a_reality(
 
 def test_each_rig_is_judged_for_itself():
     stand = record(TWIN, swing(6.0, "rail", rate=RATE), "rail", rate=RATE, name="squats")
-    few = SearchOptions(cma=dataclasses.replace(EFFORT.cma, generations=1))
+    few = dataclasses.replace(EFFORT, generations=1)
     found = identify([run(), stand], LEG, options=options(search="cma", effort=few))
     assert set(found.by_rig) == {"fixed-base", "rail"}
     errors = [v.closed_loop_position[0] for v in found.by_rig.values()]
@@ -54,7 +53,7 @@ def test_each_rig_is_judged_for_itself():
 
 @pytest.mark.parametrize("search", ["least-squares", "cma", "two-pass"])
 def test_the_same_seed_finds_the_same_bits_and_its_progress_only_rises(search):
-    few = dataclasses.replace(EFFORT, cma=dataclasses.replace(EFFORT.cma, generations=2))
+    few = dataclasses.replace(EFFORT, generations=2)
     chosen, shares = options(search=search, effort=few), []
     found = [
         identify(
@@ -91,14 +90,17 @@ def test_a_cluster_changes_no_bit():
 @pytest.fixture
 def ending_high(monkeypatch):
     """Let every search end at its upper bounds."""
-    searched = pipeline.Searcher.run
+    searched = pipeline.search
 
-    def high(self):
-        (one,) = searched(self)
-        found = dataclasses.replace(one.found, vector=one.parameters.bounds[1])
-        return [dataclasses.replace(one, found=found)]
+    def high(*args, **options):
+        (one,) = searched(*args, **options)
+        return [
+            dataclasses.replace(
+                one, found=dataclasses.replace(one.found, vector=one.parameters.bounds[1])
+            )
+        ]
 
-    monkeypatch.setattr(pipeline.Searcher, "run", high)
+    monkeypatch.setattr(pipeline, "search", high)
 
 
 @pytest.mark.usefixtures("ending_high")

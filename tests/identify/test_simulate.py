@@ -3,9 +3,9 @@ import pytest
 
 from hopping_leg.errors import RecordingError
 from hopping_leg.identify.parameters import LegHypothesis
-from hopping_leg.identify.simulate import WindowSimulator
+from hopping_leg.identify.pipeline import hold_out
+from hopping_leg.identify.simulate import WindowSimulator, cut
 from hopping_leg.identify.validation import validate
-from hopping_leg.identify.windows import cut, deal, hold_out, part
 from tests.identify.twin import LEG, STEP, changed, record, swing
 
 TRUE = LegHypothesis(LEG)
@@ -138,19 +138,9 @@ def test_windows_tile_a_recording_and_a_part_says_which_seconds_it_is():
     assert (window.start, window.length, window.unscored) == (0, 600, 20)
     with pytest.raises(RecordingError, match="too short for windows of 5 s"):
         cut([RUN], 5.0)
-    run = part(RUN, 200, 400)
+    run = RUN.part(200, 400)
     assert run.name.endswith("1.0-2.0 s")
     np.testing.assert_array_equal(run.array("position"), RUN.array("position")[200:400])
-
-
-def test_dealt_windows_are_all_there_and_every_share_is_spread_over_them():
-    windows = cut([RUN], 0.1)
-    shares = deal(windows, 4, np.random.default_rng(0))
-    assert sorted((w for share in shares for w in share), key=lambda w: w.start) == windows
-    for share in shares:
-        assert [w.start // 80 for w in share] == list(range(len(share)))
-        assert len({w.start % 80 for w in share}) > 1
-    assert [len(share) for share in deal(cut([RUN], 1.0), 9, np.random.default_rng(0))] == [1, 1, 1]
 
 
 LONG = record(LEG, swing(60.0))

@@ -28,7 +28,7 @@ from hopping_leg.cli.options import (
     show_table,
 )
 from hopping_leg.identify import plan, recording, result
-from hopping_leg.identify.optimizers import CmaOptions, SearchOptions
+from hopping_leg.identify.optimizers import SearchOptions
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.report import write_fit_report
 from hopping_leg.progress import LiveProgress, said_if_slow
@@ -63,9 +63,9 @@ class Identify:
     """Bounds in SI units, e.g. `--bounds hip.friction=0,0.5 drive.delay=0,0.01`."""
     starts: int = 1
     """Searches from different starts; the best one counts."""
-    generations: int = CmaOptions().generations
+    generations: int = SearchOptions().generations
     """Generations of CMA-ES, in each pass."""
-    population: int = CmaOptions().population
+    population: int = SearchOptions().population
     """Candidates in a generation of CMA-ES."""
     posterior: int = 0
     """Draws of all parameters that the recordings allow, for --json; 0 writes none."""
@@ -88,12 +88,14 @@ class FitProgress(LiveProgress):
 
 def run(args: Identify) -> None:
     """Identify a leg."""
-    cma = CmaOptions(generations=args.generations, population=args.population)
+    effort = SearchOptions(
+        starts=args.starts, generations=args.generations, population=args.population
+    )
     options = IdentifyOptions(
         parameters=args.parameters,
         bounds=dict(_bounds(text) for text in args.bounds),
         search=args.search,
-        effort=SearchOptions(starts=args.starts, cma=cma),
+        effort=effort,
         threads=args.threads,
         ray=args.ray,
     )

@@ -29,7 +29,7 @@ from hopping_leg.evaluate import EvaluationRun, runner, tables
 from hopping_leg.evaluate.entries import entry_of
 from hopping_leg.evaluate.report import write_report
 from hopping_leg.identify import excitation, paper_excitation, play_excitation
-from hopping_leg.identify.optimizers import LeastSquaresOptions, SearchOptions
+from hopping_leg.identify.optimizers import SearchOptions
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import Recording, load_recording
 from hopping_leg.identify.result import save_robot
@@ -170,10 +170,10 @@ def _identify(recordings: list[Recording], believed: str, folder: Path, *, quick
     start = load_robot(believed)
     links = {"thigh.inertia": start.thigh.inertia, "shank.inertia": start.shank.inertia}
     bounds = {name: (v / _INERTIA_FACTOR, v * _INERTIA_FACTOR) for name, v in links.items()}
-    effort = LeastSquaresOptions(tolerance=1e-3)
+    effort = SearchOptions(tolerance=1e-3)
     if quick:
         effort = replace(effort, rounds=1, evaluations=2)
-    asked = IdentifyOptions(bounds=bounds, effort=SearchOptions(least_squares=effort))
+    asked = IdentifyOptions(bounds=bounds, effort=effort)
     with FitProgress() as progress:
         found = identify(recordings, start, options=asked, report=progress.update)
     save_robot(found, file, believed)

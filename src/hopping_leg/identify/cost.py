@@ -10,8 +10,7 @@ from hopping_leg.arrays import Array, BoolArray, IntArray
 from hopping_leg.errors import RecordingError, UsageError
 from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.simulate import WindowSimulator
-from hopping_leg.identify.windows import Window
+from hopping_leg.identify.simulate import Window, WindowSimulator
 from hopping_leg.robot.model import COARSE_TIMESTEP
 
 

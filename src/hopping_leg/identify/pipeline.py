@@ -6,18 +6,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hopping_leg.errors import PhysicsError, RecordingError, RobotError, UsageError, unknown_name
-from hopping_leg.identify import optimizers, validation
+from hopping_leg.identify import validation
 from hopping_leg.identify.cost import Objective, Scoring
 from hopping_leg.identify.identifiability import Identifiability, identifiability
-from hopping_leg.identify.optimizers import Pass, Report, Searcher, SearchOptions
+from hopping_leg.identify.optimizers import Pass, Report, SearchOptions, jacobian, search
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import FitPlan, check_recordings, make_plan
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import PAIRS
 from hopping_leg.identify.result import Identified
-from hopping_leg.identify.windows import SHORTEST, cut, duration, hold_out
+from hopping_leg.identify.simulate import cut
 from hopping_leg.robot import NO_MISMATCH, Robot, check_physics
 
+_SHARE = 4  # one stretch in so many is held out
+_STRETCH = 5.0  # usual length of a stretch, s
+_SHORTEST = 1.0  # a stretch below this, s, judges nothing
 _CREEP = 0.02  # rad/s; intervals hold what friction that fades below it makes of the values
 
 
@@ -86,10 +89,9 @@ def identify(
     objective = Objective(
         tuple(fit), tuple(windows), plan.parameters, plan.scoring, plan.timestep, options.threads
     )
-    searcher = Searcher(plan, objective, options.effort, seed, report, options.ray)
-    passes = searcher.run()
+    passes = search(plan, objective, options.effort, seed=seed, report=report, ray=options.ray)
     report("finding intervals", 1.0, passes[-1].found.cost)
-    hypothesis, known = _conclude(objective, passes[-1], options)
+    hypothesis, known = _conclude(objective, passes[-1])
     report("judging", 1.0, passes[-1].found.cost)
     effort = (plan.timestep, options.threads)
     before, after = (validation.validate(held, h, *effort) for h in (plan.start, hypothesis))
@@ -165,35 +167,67 @@ def _unexplained(
     table = table.with_columns(
         sign * table[name] + shift for name, (sign, shift) in changes.items() if name in table
     )
-    driven = replace(driven, trace=replace(driven.trace, table=table))
+    driven = driven.with_table(table)
     errors = np.array(validation.open_loop([driven], start, _SOON))
     spread = np.nanstd(driven.array("position"), axis=0)
     return float(np.nan_to_num(np.sum((errors / np.maximum(spread, 1e-6)) ** 2), nan=np.inf))
 
 
 def _split(
-    recordings: Sequence[Recording], validation: Sequence[Recording], plan: FitPlan, seed: int
+    recordings: Sequence[Recording], judges: Sequence[Recording], plan: FitPlan, seed: int
 ) -> tuple[list[Recording], list[Recording], str]:
-    if not validation:
+    """Return what is fitted, what judges the fit, and how they were parted."""
+    if not judges:
         rng = np.random.default_rng(seed)
         return *hold_out(recordings, plan.window, rng), "held-out stretches"
-    for recording in validation:
-        if recording.digest and any(recording.digest == r.digest for r in recordings):
+    for judge in judges:
+        if judge.digest and any(judge.digest == r.digest for r in recordings):
             raise UsageError(
-                f"{recording.name} is to be fitted and to judge the fit; use each for one of the"
-                " two, or leave --validate out to hold a quarter of all out."
+                f"{judge.name} is to be fitted and to judge the fit; use each for one of the two,"
+                " or leave --validate out to hold a quarter of all out."
             )
-        if duration(recording) < SHORTEST:
+        if judge.duration < _SHORTEST:
             raise RecordingError(
-                f"{recording.name} is too short to judge by: {duration(recording):.3g} s; record"
-                f" at least {SHORTEST:g} s."
+                f"{judge.name} is too short to judge by: {judge.duration:.3g} s; record at least"
+                f" {_SHORTEST:g} s."
             )
-    return list(recordings), list(validation), "validation recordings"
+    return list(recordings), list(judges), "validation recordings"
 
 
-def _conclude(
-    objective: Objective, last: Pass, options: IdentifyOptions
-) -> tuple[LegHypothesis, Identifiability]:
+def hold_out(
+    recordings: Sequence[Recording], window: float, rng: np.random.Generator
+) -> tuple[list[Recording], list[Recording]]:
+    """Split recordings into what is fitted and what judges the fit.
+
+    Every fourth of equal stretches is held out, counted from a random one; a short recording gives
+    its last quarter. No stretch to fit is shorter than a window, s.
+
+    Raises:
+        RecordingError: A recording is too short to be split.
+    """
+    fit: list[Recording] = []
+    held: list[Recording] = []
+    for recording in recordings:
+        whole, spare = recording.duration, 2 * recording.metadata.period
+        least = max(_SHARE * _SHORTEST, window * _SHARE / (_SHARE - 1) + spare)
+        if whole < least:
+            raise RecordingError(
+                f"{recording.name} is too short: {whole:.3g} s, but {least:.3g} s are needed to"
+                " fit to one part and to judge by another; record longer, or name recordings to"
+                " judge by with --validate."
+            )
+        count = max(_SHARE, int(whole / max(_STRETCH, 1.25 * window)))
+        begin = int(rng.integers(_SHARE)) if count >= 2 * _SHARE else _SHARE - 1
+        edges = np.linspace(0, len(recording), count + 1).round().astype(int)
+        chosen = [i for i in range(count) if i % _SHARE == begin]
+        held += [recording.part(edges[i], edges[i + 1]) for i in chosen]
+        for first, last in zip([-1, *chosen], [*chosen, count], strict=True):
+            if edges[last] - edges[first + 1] >= round(window * recording.metadata.rate_hz) + 2:
+                fit.append(recording.part(edges[first + 1], edges[last]))
+    return fit, held
+
+
+def _conclude(objective: Objective, last: Pass) -> tuple[LegHypothesis, Identifiability]:
     """Return the best hypothesis and what is known of it, unless it breaks down in simulation."""
     objective = replace(objective, parameters=last.parameters)
     vector = last.found.vector
@@ -213,9 +247,9 @@ def _conclude(
             f"The fit failed: its best candidate breaks down in {broken} of {len(lengths)} windows;"
             " narrow the bounds, fit fewer parameters, or check the recording's gains and units."
         )
-    step, bounds = options.effort.least_squares.step, last.parameters.bounds
     residuals = objective.residuals(vector[None])[0]
-    slopes = optimizers.jacobian(objective.residuals, vector, bounds, step, objective.jumping)
+    bounds = last.parameters.bounds
+    slopes = jacobian(objective.residuals, vector, bounds, objective.jumping)
     creeping = replace(last.parameters, base=last.parameters.base.replace({"drive.creep": _CREEP}))
     change = replace(objective, parameters=creeping).residuals(vector[None])[0] - residuals
     if objective.loss is not None:

@@ -117,11 +117,14 @@ def make_plan(
         raise UsageError(unknown_name("search", search, SEARCHES))
     start = _start(recordings, robot)
     paper = search == "two-pass"
-    names = parameters or _names(recordings, paper=paper)
+    if paper:  # Table I, and what is asked for besides
+        first, second = pass_names([r.metadata.rig for r in recordings])
+        besides = parameters or _open_gains(recordings)
+        parameters = tuple(dict.fromkeys([*first, *second, *besides]))
     limits = {**_speed_bounds(recordings, robot), **(bounds or {})}
     return FitPlan(
         start,
-        choose(start, names, bounds=limits),
+        choose(start, parameters or _names(recordings), bounds=limits),
         scoring or (cost.Scoring() if paper else _scoring(recordings)),
         *_window(recordings),
         COARSE_TIMESTEP,
@@ -140,11 +143,9 @@ def pass_names(rigs: Sequence[recording_format.Rig]) -> tuple[list[str], list[st
     return _JOINT_PARAMETERS, _INERTIAS
 
 
-def _names(recordings: Sequence[Recording], *, paper: bool) -> list[str]:
-    """Return what these recordings can tell, or Table I; and drives' gains nobody knows."""
+def _names(recordings: Sequence[Recording]) -> list[str]:
+    """Return what these recordings can tell, and drives' gains nobody knows."""
     first, second = pass_names([r.metadata.rig for r in recordings])
-    if paper:
-        return [*first, *second, *_open_gains(recordings)]
     names = [n for n in first + second if n not in (*_INERTIAS, "hip.armature")]
     names += ["thigh.com", "shank.com", *_INERTIAS, "drive.delay"]
     if _tell_load(recordings):

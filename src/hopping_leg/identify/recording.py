@@ -80,6 +80,21 @@ class Recording:
         edges = [0, *stalls.tolist(), len(self)]
         return [slice(a, b) for a, b in pairwise(edges)]
 
+    @property
+    def duration(self) -> float:
+        """How long it is, s."""
+        return float(self.time[-1] - self.time[0]) + self.metadata.period
+
+    def part(self, start: int, stop: int) -> "Recording":
+        """Return rows as a recording whose name says which seconds they are."""
+        first, last = (float(self.time[row]) - self.time[0] for row in (start, stop - 1))
+        name = f"{self.name}, {first:.1f}-{last:.1f} s"
+        return replace(self.with_table(self.trace.table[int(start) : int(stop)]), name=name)
+
+    def with_table(self, table: pl.DataFrame) -> "Recording":
+        """Return the recording with another table, unchecked."""
+        return replace(self, trace=replace(self.trace, table=table))
+
     def with_metadata(self, **changes: Any) -> "Recording":  # noqa: ANN401
         """Return the recording with other facts in its metadata, e.g. gains known elsewhere."""
         return replace(self, metadata=replace(self.metadata, **changes))

@@ -373,10 +373,10 @@ def _check_sizes(inspection: Inspection) -> None:
     if (robot := inspection.robot) is not None:
         peaks = [j.motor.peak_torque * j.belt_ratio for j in (robot.hip, robot.knee)]
     columns = {"height_m": (_HIGHEST, "m", "mm"), "base_rise_m": (_HIGHEST, "m", "mm")}
-    for quantity, (most, *units) in _SIZES.items():
+    for quantity, (most, unit, guess) in _SIZES.items():
         for name in (quantity, f"{quantity}_command"):
             for column, peak in zip(PAIRS[name], peaks, strict=True):
-                columns[column] = (most * peak if quantity == "torque" else most, *units)
+                columns[column] = (most * peak if quantity == "torque" else most, unit, guess)
     for column, (most, unit, guess) in columns.items():
         values = inspection.floats(column)
         if np.isnan(values).all():

@@ -1,8 +1,11 @@
-"""All hypotheses times all windows simulated at once, under the controller of the recording."""
+"""All hypotheses times all windows simulated at once, under the controller of the recording.
+
+A window begins in a measured state.
+"""
 
 import os
 from collections.abc import Sequence
-from concurrent.futures import wait
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 
@@ -12,16 +15,64 @@ from hopping_leg.arrays import Array, Records
 from hopping_leg.errors import RecordingError, UsageError
 from hopping_leg.identify import initial_states, parameters, replay
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.windows import Window
 from hopping_leg.robot import COARSE_TIMESTEP, Robot, kinematics
 from hopping_leg.sim.compiled import compiling_notice
-from hopping_leg.sim.leg_simulator import thread_pool
 from hopping_leg.sim.leg_table import LEG, leg_table
 
 _GAINS = ("stiffness", "damping", "integral")
 _ONBOARD = {"torque": replay.TORQUE, "zoh": replay.ZOH, "continuous": replay.CONTINUOUS}
 _SURPLUS = 0.3  # share of an inertia beyond which damping is not made up for
 _PARTS = 4  # pieces of work per thread, as windows differ in length
+
+
+@dataclass(frozen=True)
+class Window:
+    """Rows ``start`` to ``start + length`` of a recording."""
+
+    recording: int
+    """Index of the recording."""
+    start: int
+    """First row, whose state starts the simulation."""
+    length: int
+    unscored: int = 1
+    """Rows at the beginning that no residual counts, while the start's error decays."""
+
+
+def cut(
+    recordings: Sequence[Recording],
+    duration: float | None = None,
+    *,
+    stride: float | None = None,
+    unscored: float = 0.0,
+) -> list[Window]:
+    """Cut recordings into windows of one duration, s, whose first ``unscored`` s do not count.
+
+    Without a duration each recording is one window, as in the paper. The stride, s, is from one
+    window's start to the next; without it there is no gap and no overlap.
+
+    Raises:
+        RecordingError: A recording is shorter than one window.
+    """
+    windows: list[Window] = []
+    for index, recording in enumerate(recordings):
+        rate = recording.metadata.rate_hz
+        skip = max(1, round(unscored * rate))
+        before = len(windows)
+        for segment in recording.segments():
+            rows = segment.stop - segment.start
+            length = rows if duration is None else round(duration * rate)
+            if length <= skip + 1:
+                continue
+            step = length if stride is None else max(1, round(stride * rate))
+            starts = range(segment.start, segment.stop - length + 1, step)
+            windows += [Window(index, start, length, skip) for start in starts]
+        if len(windows) == before:
+            wanted = f"windows of {duration:g} s" if duration else "one window"
+            raise RecordingError(
+                f"{recording.name} has {len(recording)} rows, {len(recording) / rate:.3g} s, too"
+                f" short for {wanted} of which {skip / rate:.3g} s do not count; record longer."
+            )
+    return windows
 
 
 @cache
@@ -113,9 +164,9 @@ class _WindowGroup:
             work(0, pairs)
         else:
             parts = min(pairs, _PARTS * self._threads)
-            ends = np.linspace(0, pairs, parts + 1).astype(int).tolist()
-            tasks = [thread_pool().submit(work, *ends[k : k + 2]) for k in range(parts)]
-            wait(tasks)
+            ends = np.linspace(0, pairs, parts + 1).astype(int)
+            with ThreadPoolExecutor(self._threads) as pool:
+                list(pool.map(work, ends[:-1], ends[1:]))
         result[..., 0:2] += offsets[:, :, None]
         gain, offset = (_drive_values(hypotheses, n) for n in ("sensor_gain", "torque_offset"))
         result[..., 4:6] = gain[:, None, None] * result[..., 4:6] + offset[:, None, None]

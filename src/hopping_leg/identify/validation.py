@@ -1,15 +1,15 @@
 """Judging a hypothesis on recordings: in closed loop, and predicting open-loop from torques."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.identify import initial_states, parameters, recording_format, simulate
+from hopping_leg.identify import initial_states, parameters, recording_format
 from hopping_leg.identify.cost import measured
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.windows import Window, cut, duration
+from hopping_leg.identify.simulate import Window, WindowSimulator, cut
 from hopping_leg.robot.model import COARSE_TIMESTEP
 
 HORIZONS = (0.2, 0.5, 1.0)
@@ -81,7 +81,7 @@ def _errors(
 ) -> list[recording_format.Pair]:
     if not windows:
         return [(np.nan, np.nan)] * len(quantities)
-    simulator = simulate.WindowSimulator(recordings, windows, timestep=timestep, threads=threads)
+    simulator = WindowSimulator(recordings, windows, timestep=timestep, threads=threads)
     simulated = simulator.run([hypothesis])
     return [rms(getattr(simulated, q)[0] - measured(simulator, q)) for q in quantities]
 
@@ -103,8 +103,7 @@ def as_torque_driven(recording: Recording) -> Recording:
             now = table[torque].interpolate().fill_null(strategy="backward")
             later = now.shift(-1).fill_null(strategy="forward")
             table = table.with_columns(((1 - share) * now + share * later).alias(command))
-    trace = replace(recording.trace, table=table)
-    return replace(recording, trace=trace).with_metadata(onboard="torque")
+    return recording.with_table(table).with_metadata(onboard="torque")
 
 
 def _starts_known(recordings: Sequence[Recording], window: Window) -> bool:
@@ -128,7 +127,7 @@ def rms(errors: Array) -> recording_format.Pair:
 
 def _unscored(recordings: Sequence[Recording]) -> float:
     """Return the beginning of each recording that does not count in closed loop, s."""
-    return min(_UNSCORED, 0.25 * min(map(duration, recordings)))
+    return min(_UNSCORED, 0.25 * min(r.duration for r in recordings))
 
 
 RESTART = 0.5
@@ -164,9 +163,7 @@ def overlays(
         restarted = recording.metadata.onboard == "torque"
         length, unscored = (RESTART, 0.0) if restarted else (None, skip)
         windows = cut([recording], length, unscored=unscored)
-        simulator = simulate.WindowSimulator(
-            [recording], windows, timestep=timestep, threads=threads
-        )
+        simulator = WindowSimulator([recording], windows, timestep=timestep, threads=threads)
         found, known, simulated = simulator.run(hypotheses), {}, {}
         for name in ("position", "torque"):
             values = measured(simulator, name)[None]
