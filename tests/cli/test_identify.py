@@ -104,7 +104,7 @@ def write_bad(folder):
         ([], "No recording was named"),
         (["none.csv"], "There is no recording"),
         (["empty.csv"], "empty.csv is no whole table"),
-        (["noise.csv"], "noise.csv is neither Parquet nor a CSV"),
+        (["noise.csv"], "noise.csv is no whole table"),
         (["trace.parquet"], "is of no known rig"),
         (["short.csv"], "short.csv is too short"),
         (["good.csv", "--validate", "short.csv"], "too short"),

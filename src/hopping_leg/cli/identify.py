@@ -88,9 +88,7 @@ class FitProgress(LiveProgress):
 
 def run(args: Identify) -> None:
     """Identify a leg."""
-    effort = SearchOptions(
-        starts=args.starts, generations=args.generations, population=args.population
-    )
+    effort = SearchOptions(args.starts, generations=args.generations, population=args.population)
     options = IdentifyOptions(
         parameters=args.parameters,
         bounds=dict(_bounds(text) for text in args.bounds),
