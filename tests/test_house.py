@@ -12,7 +12,7 @@ CEILINGS = {
     "src/hopping_leg/controllers/**/*.py": (21, 3030),
     "src/hopping_leg/deploy/**/*.py": (19, 3140),
     "src/hopping_leg/emulator/**/*.py": (15, 2170),
-    "src/hopping_leg/envs/**/*.py": (10, 1630),
+    "src/hopping_leg/envs/**/*.py": (10, 1580),
     "src/hopping_leg/evaluate/**/*.py": (15, 2750),
     "src/hopping_leg/formats/**/*.py": (4, 260),
     "src/hopping_leg/identify/**/*.py": (20, 4560),
@@ -20,10 +20,10 @@ CEILINGS = {
     "src/hopping_leg/robot/**/*.py": (17, 2800),
     "src/hopping_leg/sim/**/*.py": (13, 2520),
     "src/hopping_leg/viewer/**/*.py": (9, 1510),
-    "src/**/*.py": (200, 31650),
-    "tests/**/*.py": (147, 17240),
+    "src/**/*.py": (200, 31600),
+    "tests/**/*.py": (147, 17210),
     "studies/**/*.py": (83, 8530),
-    "docs/**/*.md": (22, 2700),
+    "docs/**/*.md": (22, 2690),
     "docs/live/*.js": (13, 1490),
 }
 """Files and lines at most. Who raises one says what users gain by it."""

@@ -31,6 +31,7 @@ RANDOM = TaskConfig(
 APEX = apex_reward(load_robot(DEFAULT_ROBOT), ApexRewardConfig(), 200.0)
 """A reward that remembers."""
 SINGLE, VECTOR, SYNC = "single", "vector_entry_point", "sync"
+MODES = [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP]
 KINDS = [SINGLE, VECTOR, SYNC, pytest.param("async", marks=pytest.mark.slow)]
 
 
@@ -123,10 +124,10 @@ def overwrite(seen):
         seen[...] = None if seen.dtype == object else 1
 
 
-@pytest.mark.parametrize("mode", AutoresetMode)
-def test_arrays_belong_to_the_caller(mode):
-    words = {} if mode is AutoresetMode.DISABLED else {"autoreset_mode": mode}
-    kind = SINGLE if mode is AutoresetMode.DISABLED else VECTOR
+@pytest.mark.parametrize(
+    ("kind", "words"), [(SINGLE, {}), *((VECTOR, {"autoreset_mode": mode}) for mode in MODES)]
+)
+def test_arrays_belong_to_the_caller(kind, words):
     assert play(make(kind, **words), 3, spoil=overwrite) == play(make(kind, **words), 3)
 
 
@@ -163,16 +164,11 @@ def test_words_without_meaning_are_refused(kind):
     for options in ({"height": 0.3}, {"command": -1}, {"command": [0.3] * 5}, {"command": "high"}):
         with pytest.raises(UsageError, match="command"):
             env.reset(options=options)
-    with pytest.raises(UsageError, match="autoreset mode"):
-        make(VECTOR, autoreset_mode="Never")
+    for mode in ("Never", AutoresetMode.DISABLED):
+        with pytest.raises(UsageError, match="autoreset mode"):
+            make(VECTOR, autoreset_mode=mode)
     with pytest.raises(UsageError, match="episode"):
         make(VECTOR, max_episode_steps=0)
-    for mask in ([1, 0], [True], [False, False]):
-        with pytest.raises(UsageError, match="reset_mask"):
-            make(VECTOR).reset(options={"reset_mask": mask})
-    for seed in ([1], [1, -1]):
-        with pytest.raises(UsageError, match="one for each of 2 legs"):
-            make(VECTOR).reset(seed=seed)
 
 
 @pytest.mark.parametrize("kind", [SINGLE, VECTOR])
@@ -199,24 +195,6 @@ def test_a_given_command_holds_for_its_episode(kind):
     assert (np.array(info["command"]) != 0.28).all()
 
 
-def test_a_seed_for_every_leg_and_a_mask():
-    env = make(VECTOR)
-    assert play(env, [1, 2]) == play(env, [1, 2]) != play(env, [1, 3])
-    assert play(env, [1, None]) != play(env, [1, None])
-    env.reset(seed=5)
-    env.step(plan(env)[0])
-    drawn, before = legs(env), env.unwrapped.task.legs.state[0].copy()
-    mask = np.array([False, True])
-    _, info = env.reset(seed=6, options={"reset_mask": mask, "command": [0.2, 0.33]})
-    np.testing.assert_array_equal(env.unwrapped.task.legs.state[0], before)
-    np.testing.assert_array_equal(info["_command"], mask)
-    assert info["command"][1] == 0.33
-    assert info["command"][0] != 0.2
-    assert legs(env) == drawn
-    early = make(VECTOR)
-    assert np.isfinite(early.reset(options={"reset_mask": mask})[0]).all()
-
-
 def same(ours, theirs):
     """Compare infos where their masks say that there is something."""
     keys = {k for k in (*ours, *theirs) if not k.startswith("_")}
@@ -233,7 +211,7 @@ def same(ours, theirs):
                 np.testing.assert_allclose(mine, yours, rtol=1e-6, err_msg=key)
 
 
-@pytest.mark.parametrize("mode", AutoresetMode)
+@pytest.mark.parametrize("mode", MODES)
 def test_the_vector_environment_does_as_gymnasiums_own(mode):
     options = TaskConfig(
         episode=0.2, commands=(0.3,), disturbance=NO_NOISE, fall_clearance=0.06, fall_penalty=1.0
@@ -254,11 +232,6 @@ def test_the_vector_environment_does_as_gymnasiums_own(mode):
         same(one[4], other[4])
         ended = one[2] | one[3]
         ends += ended
-        if mode is AutoresetMode.DISABLED and ended.any():
-            with pytest.raises(UsageError, match="has ended"):
-                ours.step(push)
-            for env in (ours, theirs):
-                env.reset(options={"reset_mask": ended})
     assert (ends > 2).all()
     assert ends[0] != ends[1], "one leg fell, one had its time"
 

@@ -7,20 +7,21 @@ every array that is handed out is the caller's.
 
 import dataclasses
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
 import mujoco
 import numpy as np
 import numpy.typing as npt
+from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from hopping_leg.arrays import Array, Array32, BoolArray, IntArray
-from hopping_leg.envs import rewards, task_config
+from hopping_leg.arrays import Array, Array32, BoolArray
 from hopping_leg.envs.paper_reward import paper_reward
+from hopping_leg.envs.rewards import Reward
 from hopping_leg.envs.task import HoppingTask, Step
+from hopping_leg.envs.task_config import TaskConfig
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, build_model, load_robot
 from hopping_leg.sim import LegSimulator
@@ -35,9 +36,9 @@ class Camera:
 
     def __init__(self, legs: LegSimulator) -> None:
         self.legs = legs
+        self._renderer: Any = None
         self._model = build_model(legs.robot)
         self._data = mujoco.MjData(self._model)
-        self._renderer: Any = None
 
     def picture(self, leg: int = 0) -> Image:
         """Return an RGB picture of a leg, (480, 640, 3); a UsageError where there is no OpenGL."""
@@ -49,8 +50,7 @@ class Camera:
                     f"Pictures need OpenGL, which is not available here ({error}); install a driver"
                     " and set MUJOCO_GL=egl or MUJOCO_GL=osmesa, or do not render."
                 ) from error
-        self._data.qpos[0] = self.legs.height[leg]
-        self._data.qpos[1:] = self.legs.q[leg]
+        self._data.qpos[0], self._data.qpos[1:] = self.legs.height[leg], self.legs.q[leg]
         mujoco.mj_forward(self._model, self._data)
         self._renderer.update_scene(self._data, camera="side")
         image: Image = self._renderer.render()
@@ -63,32 +63,32 @@ class Camera:
             self._renderer = None
 
 
-def _make_task(
-    robot: Robot | str,
-    num_envs: int,
-    options: task_config.TaskConfig,
-    reward: rewards.Reward | None,
-    threads: int,
-    *,
-    autoreset: bool,
-) -> HoppingTask:
-    leg = load_robot(robot) if isinstance(robot, str) else robot
-    terms, rng = reward or paper_reward(leg), np.random.default_rng(0)
-    return HoppingTask(leg, num_envs, options, terms, rng, threads, autoreset=autoreset)
+class _TaskView:
+    """What both environments are: a task, its spaces, its camera, and whether it was seeded."""
 
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 200}  # noqa: RUF012
+    np_random: np.random.Generator
 
-def _spaces(
-    task: HoppingTask,
-) -> "tuple[gymnasium.spaces.Box[np.float32], gymnasium.spaces.Box[np.float32]]":
-    """Return spaces of an observation and of an action, torques over ``action_torque``."""
-    size = (task.observation.size,)
-    seen = gymnasium.spaces.Box(-_LARGEST, _LARGEST, size, np.float32)
-    return seen, gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
+    def _open(
+        self, robot: Robot | str, count: int, options: TaskConfig, reward: Reward | None,
+        render_mode: str | None, threads: int, *, autoreset: bool,
+    ) -> "tuple[Box[np.float32], Box[np.float32]]":  # fmt: skip
+        """Make the task; return the spaces of a leg's observation and action."""
+        if render_mode not in (None, *(valid := _TaskView.metadata["render_modes"])):
+            raise UsageError(unknown_name("render mode", str(render_mode), valid))
+        leg = load_robot(robot) if isinstance(robot, str) else robot
+        self.render_mode = render_mode
+        self.metadata = {**type(self).metadata, "render_fps": round(options.rate)}
+        terms, rng = reward or paper_reward(leg), np.random.default_rng(0)
+        self.task = HoppingTask(leg, count, options, terms, rng, threads, autoreset=autoreset)
+        self._camera, self._seeded = Camera(self.task.legs), False
+        seen = Box(-_LARGEST, _LARGEST, (self.task.observation.size,), np.float32)
+        return seen, Box(-1.0, 1.0, (2,), np.float32)
 
-
-def _check_render_mode(mode: str | None) -> None:
-    if mode not in (None, *(valid := HoppingEnv.metadata["render_modes"])):
-        raise UsageError(unknown_name("render mode", str(mode), valid))
+    def _begin(self, seed: int | None, command: Array | None) -> Array32:
+        again, self._seeded = self._seeded and seed is None, True
+        task = self.task
+        return task.reset(None, command) if again else task.reseed(self.np_random, None, command)
 
 
 def _numbers(action: Any) -> Array:  # noqa: ANN401
@@ -100,39 +100,26 @@ def _numbers(action: Any) -> Array:  # noqa: ANN401
         raise UsageError(f"An action must be an array of numbers, not {action!r:.60}.") from error
 
 
-def _asked(
-    options: dict[str, Any] | None, count: int, *names: str
-) -> tuple[IntArray | None, Array | None]:
-    """Return which legs a reset is for, None for all, and their commands, m, None to draw them."""
-    options = options or {}
-    for name in options:
-        if name not in names:
-            raise UsageError(unknown_name("option of reset", str(name), names))
-    mask, command = options.get("reset_mask"), options.get("command")
-    rows = None
-    if mask is not None:
-        mask = np.asarray(mask)
-        if mask.shape != (count,) or mask.dtype != np.bool_ or not mask.any():
-            raise UsageError(
-                f"'reset_mask' must hold true or false for each of {count} legs, true at least"
-                f" once, not {mask!r:.60}."
-            )
-        rows = np.flatnonzero(mask)
-    if command is not None:
-        try:
-            command = np.broadcast_to(np.asarray(command, np.float64), count)
-        except (TypeError, ValueError):
-            command = np.zeros(1)
-        if not ((command > 0) & (command < np.inf)).all():
-            raise UsageError(
-                f"'command' must be a positive height in m, one for all or for each of {count}"
-                f" legs, not {options['command']!r:.60}."
-            )
-        command = command if rows is None else command[rows]
-    return rows, command
+def _asked(options: dict[str, Any] | None, count: int) -> Array | None:
+    """Return the commands that a reset is asked for, m, (count,), None to draw them."""
+    for name in options or {}:
+        if name != "command":
+            raise UsageError(unknown_name("option of reset", str(name), ["command"]))
+    if (command := (options or {}).get("command")) is None:
+        return None
+    try:
+        heights = np.broadcast_to(np.asarray(command, np.float64), count)
+    except (TypeError, ValueError):
+        heights = np.zeros(1)
+    if not ((heights > 0) & (heights < np.inf)).all():
+        raise UsageError(
+            f"'command' must be a positive height in m, one for all or for each of {count} legs,"
+            f" not {command!r:.60}."
+        )
+    return heights
 
 
-class HoppingEnv(gymnasium.Env[Array32, Array32]):
+class HoppingEnv(_TaskView, gymnasium.Env[Array32, Array32]):
     """One leg hopping to commanded heights.
 
     ``info`` holds ``base_height`` and ``command``, that of the tick, m, ``reward_terms``, the
@@ -146,21 +133,16 @@ class HoppingEnv(gymnasium.Env[Array32, Array32]):
         UsageError: The render mode is unknown.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 200}  # noqa: RUF012
-
     def __init__(
         self,
         robot: Robot | str = DEFAULT_ROBOT,
-        options: task_config.TaskConfig = task_config.TaskConfig(),  # noqa: B008
-        reward: rewards.Reward | None = None,
+        options: TaskConfig = TaskConfig(),  # noqa: B008
+        reward: Reward | None = None,
         render_mode: str | None = None,
     ) -> None:
-        _check_render_mode(render_mode)
-        self.render_mode = render_mode
-        self.metadata = {**type(self).metadata, "render_fps": round(options.rate)}
-        self.task = _make_task(robot, 1, options, reward, threads=1, autoreset=False)
-        self.observation_space, self.action_space = _spaces(self.task)
-        self._camera, self._seeded = Camera(self.task.legs), False
+        self.observation_space, self.action_space = self._open(
+            robot, 1, options, reward, render_mode, 1, autoreset=False
+        )
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -169,12 +151,10 @@ class HoppingEnv(gymnasium.Env[Array32, Array32]):
 
         The option ``command`` is the episode's height, m; UsageError refuses any other.
         """
-        _, command = _asked(options, 1, "command")
+        command = _asked(options, 1)
         super().reset(seed=seed)
-        again, self._seeded = self._seeded and seed is None, True
-        task = self.task
-        seen = task.reset(None, command) if again else task.reseed(self.np_random, None, command)
-        return seen[0], {"base_height": task.legs.height.item(), "command": task.command.item()}
+        seen, task = self._begin(seed, command)[0], self.task
+        return seen, {"base_height": task.legs.height.item(), "command": task.command.item()}
 
     def step(self, action: Array32) -> tuple[Array32, float, bool, bool, dict[str, Any]]:
         """Act for one control period; UsageError refuses an action that is not two numbers."""
@@ -198,21 +178,21 @@ class HoppingEnv(gymnasium.Env[Array32, Array32]):
         self._camera.close()
 
 
-class HoppingVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
+class HoppingVectorEnv(_TaskView, gymnasium.vector.VectorEnv[Array32, Array32, Any]):
     """Legs hopping to commanded heights, on the batched simulation.
 
     Arguments are those of ``HoppingEnv``; the threads, 0 for one per core, change no result. Where
     an episode ended, the next one begins by ``autoreset_mode``: in the step after it, whose action
-    counts for nothing; in the same step, whose ``info["final_obs"]`` and ``info["final_info"]``
-    hold what ``HoppingEnv`` would have returned; or, disabled, with ``reset`` alone. Episodes are
-    no longer than ``max_episode_steps``, as with Gymnasium's own ``TimeLimit``.
+    counts for nothing, or in the same step, whose ``info["final_obs"]`` and ``info["final_info"]``
+    hold what ``HoppingEnv`` would have returned. Episodes are no longer than ``max_episode_steps``,
+    as with Gymnasium's own ``TimeLimit``.
 
     Raises:
         UsageError: The mode of rendering or autoreset is unknown, or an episode has no steps.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
-        **HoppingEnv.metadata,
+        **_TaskView.metadata,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
@@ -220,95 +200,59 @@ class HoppingVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
         self,
         num_envs: int = 1,
         robot: Robot | str = DEFAULT_ROBOT,
-        options: task_config.TaskConfig = task_config.TaskConfig(),  # noqa: B008
-        reward: rewards.Reward | None = None,
+        options: TaskConfig = TaskConfig(),  # noqa: B008
+        reward: Reward | None = None,
         threads: int = 0,
         render_mode: str | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         max_episode_steps: int | None = None,
     ) -> None:
-        _check_render_mode(render_mode)
-        try:
-            self._mode = AutoresetMode(autoreset_mode)
-        except ValueError as error:
-            names = [mode.value for mode in AutoresetMode]
-            raise UsageError(unknown_name("autoreset mode", str(autoreset_mode), names)) from error
-        self.num_envs, self.render_mode = num_envs, render_mode
-        self.metadata = {
-            **type(self).metadata,
-            "render_fps": round(options.rate),
-            "autoreset_mode": self._mode,
-        }
+        modes = {mode.value: mode for mode in (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP)}
+        named = getattr(autoreset_mode, "value", autoreset_mode)
+        if named not in modes:
+            raise UsageError(unknown_name("autoreset mode", str(named), modes))
         if max_episode_steps is not None:
             longest = min(options.episode, max_episode_steps / options.rate)
             options = dataclasses.replace(options, episode=longest)
-        same_step = self._mode is AutoresetMode.SAME_STEP
-        self.task = _make_task(robot, num_envs, options, reward, threads, autoreset=same_step)
-        self.single_observation_space, self.single_action_space = _spaces(self.task)
+        same_step = modes[named] is AutoresetMode.SAME_STEP
+        self.num_envs = num_envs
+        self.single_observation_space, self.single_action_space = self._open(
+            robot, num_envs, options, reward, render_mode, threads, autoreset=same_step
+        )
+        self.metadata["autoreset_mode"] = modes[named]
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._ended = np.zeros(num_envs, np.bool_)  # legs that wait for their next episode
-        self._camera, self._seeded = Camera(self.task.legs), False
 
     def reset(
-        self,
-        *,
-        seed: int | Sequence[int | None] | None = None,
-        options: dict[str, Any] | None = None,
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array32, dict[str, Any]]:
-        """Begin an episode in every leg, or in those of the option ``reset_mask``, (n,).
+        """Begin an episode in every leg; a ``seed`` restarts all randomness, what differs included.
 
-        A seed, or a sequence of one per leg, restarts all randomness: the legs share one source of
-        it, and what differs from leg to leg is drawn anew unless there is a mask. The option
-        ``command`` is the episodes' height, m, or (n,) of them; UsageError refuses any other.
+        The option ``command`` is the episodes' height, m, or (n,) of them; UsageError refuses any
+        other.
         """
-        rows, command = _asked(options, self.num_envs, "command", "reset_mask")
-        if rows is not None and not self._seeded:
-            self.reset()  # the legs that the mask leaves out begin somehow, too
-        self._restart_randomness(seed)
-        again, self._seeded = self._seeded and seed is None, True
-        task = self.task
-        seen = task.reset(rows, command) if again else task.reseed(self.np_random, rows, command)
-        new = np.ones(self.num_envs, np.bool_)
-        if rows is not None:
-            new = np.isin(np.arange(self.num_envs), rows)
-        self._ended[new] = False
+        command = _asked(options, self.num_envs)
+        super().reset(seed=seed)
+        seen, task = self._begin(seed, command), self.task
+        self._ended[:] = False
         standing = {"base_height": task.legs.height.copy(), "command": task.command.copy()}
-        return seen, self._masked(standing, new)
-
-    def _restart_randomness(self, seed: int | Sequence[int | None] | None) -> None:
-        if seed is None or isinstance(seed, int | np.integer):
-            super().reset(seed=None if seed is None else int(seed))
-            return
-        if len(seed) != self.num_envs or any(one is not None and one < 0 for one in seed):
-            raise UsageError(
-                f"Seeds must be one for all or one for each of {self.num_envs} legs, 0 or more, not"
-                f" {seed!r:.60}."
-            )
-        unknown = np.random.SeedSequence().generate_state(self.num_envs)
-        numbers = [unknown[leg] if one is None else one for leg, one in enumerate(seed)]
-        self.np_random = np.random.default_rng([int(number) for number in numbers])
+        return seen, self._masked(standing, ~self._ended)
 
     def step(self, actions: Array32) -> tuple[Array32, Array, BoolArray, BoolArray, dict[str, Any]]:
         """Act for one control period in every leg; actions are (n, 2).
 
         Raises:
-            UsageError: Actions are not finite or of another shape, or a leg's episode has ended and
-                nobody has begun the next.
+            UsageError: Actions are not finite or of another shape.
         """
-        new, waiting = self._ended, np.count_nonzero(self._ended)
-        if waiting and self._mode is AutoresetMode.DISABLED:
-            raise UsageError(
-                f"The episode of leg {int(np.argmax(new))} has ended; begin the next one with"
-                " reset(options={'reset_mask': terminated | truncated})."
-            )
         step = self.task.step(_numbers(actions))
         seen, reward = step.observation, step.reward
         terminated, truncated = step.terminated.copy(), step.truncated.copy()
-        if waiting:
+        new = self._ended
+        if new.any():
             seen = self.task.reset(np.flatnonzero(new))
             reward[new], terminated[new], truncated[new] = 0.0, False, False
-        if self._mode is AutoresetMode.SAME_STEP:
+        if self.task.autoreset:
             new = terminated | truncated
         else:
             self._ended = terminated | truncated
