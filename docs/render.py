@@ -7,6 +7,7 @@ with literal arguments. A result is named ``STUDY/FILE``, e.g. ``speed/env.json`
 """
 
 import ast
+import contextlib
 import json
 import re
 import sys
@@ -49,10 +50,15 @@ def pivot(file: str, path: str, row: str, column: str, cell: str, **where: Any) 
         path: Dotted path of the list.
         row: Key of the lines.
         column: Key of the columns.
-        cell: How a record's entries are shown, e.g. ``{score:.0%}``.
+        cell: How a record's entries are shown, e.g. ``{score:.0%}``; a name that ends in ``_mm`` is
+            the entry in ``_m``, in mm.
         where: Show only records with these entries.
     """
-    cells = {(r[row], r[column]): cell.format(**r) for r in _rows(file, path, where)}
+    cells = {}
+    for r in _rows(file, path, where):
+        mm = {f"{k}m": 1e3 * v for k, v in r.items() if k.endswith("_m") and isinstance(v, float)}
+        with contextlib.suppress(KeyError, TypeError):  # a number that does not exist
+            cells[r[row], r[column]] = cell.format(**r, **mm)
     titles = list(dict.fromkeys(title for _, title in cells))
     keys = dict.fromkeys(key for key, _ in cells)
     lines = [[str(key), *(cells.get((key, title), "–") for title in titles)] for key in keys]

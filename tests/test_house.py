@@ -23,7 +23,7 @@ CEILINGS = {
     "src/**/*.py": (200, 31600),
     "tests/**/*.py": (147, 17210),
     "studies/**/*.py": (83, 8530),
-    "docs/**/*.md": (22, 2690),
+    "docs/**/*.md": (22, 2680),
     "docs/live/*.js": (13, 1490),
 }
 """Files and lines at most. Who raises one says what users gain by it."""
