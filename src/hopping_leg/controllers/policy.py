@@ -57,7 +57,7 @@ def measure_session(session: Any, shapes: dict[str, tuple[int, ...]], origin: st
         PolicyError: It fails, gives something else than torques, or does not return.
     """
     feeds = {name: np.zeros((1, *shape), np.float32) for name, shape in shapes.items()}
-    options, took = onnxruntime.RunOptions(), np.inf
+    options, took = onnxruntime.RunOptions(), []
     options.log_severity_level = 4
     ending = threading.Timer(_MOST_SECONDS, setattr, (options, "terminate", True))
     ending.daemon = True
@@ -65,19 +65,18 @@ def measure_session(session: Any, shapes: dict[str, tuple[int, ...]], origin: st
     try:
         for _ in range(_RUNS):
             began = time.perf_counter()
-            torque, *_ = session.run(None, feeds, options)
-            took = min(took, time.perf_counter() - began)
+            torque = np.asarray(session.run(None, feeds, options)[0])
+            took.append(time.perf_counter() - began)
     except Exception as error:  # onnxruntime raises many unrelated types
-        if options.terminate:
-            raise PolicyError(
-                f"{origin} does not answer within {_MOST_SECONDS:g} s; does its graph loop?"
-            ) from error
-        raise PolicyError(f"{origin} fails where it is run: it is damaged.") from error
+        why = f"does not answer within {_MOST_SECONDS:g} s; does its graph loop?"
+        if not options.terminate:
+            why = "fails where it is run: it is damaged."
+        raise PolicyError(f"{origin} {why}") from error
     finally:
         ending.cancel()
-    if np.shape(torque) != (1, 2) or np.asarray(torque).dtype != np.float32:
-        raise PolicyError(f"{origin} gives {np.shape(torque)} for one leg, not two torques.")
-    return float(took)
+    if torque.shape != (1, 2) or torque.dtype != np.float32:
+        raise PolicyError(f"{origin} gives {torque.shape} for one leg, not two torques.")
+    return min(took)
 
 
 SCHEMA = 1
@@ -136,23 +135,18 @@ class Card:
     """Largest of the same."""
 
     def __post_init__(self) -> None:
-        hip, knee = self.torque_scale
+        bounds = {len(self.input_low), len(self.input_high)}
         for name, holds in (
             ("rate", 1 <= self.rate <= _MOST_RATE),
             ("command_low", 0 < self.command_low <= self.command_high),
-            ("torque_scale", min(hip, knee) > 0),
+            ("torque_scale", min(self.torque_scale) > 0),
+            ("input_low", bounds in ({0}, {len(INPUTS)}) and self.input_low <= self.input_high),
         ):
             if not holds:
                 raise PolicyError(
                     f"'{name}' of its card is {getattr(self, name)}, which no policy has; export"
                     " the policy again."
                 )
-        sizes = {len(self.input_low), len(self.input_high)}
-        if len(sizes) > 1 or not sizes <= {0, len(INPUTS)} or self.input_low > self.input_high:
-            raise PolicyError(
-                f"'input_low' and 'input_high' of its card must hold {len(INPUTS)} rising pairs, or"
-                " nothing; export the policy again."
-            )
 
     def to_json(self) -> str:
         """Return the card as stored in the file."""
@@ -205,12 +199,12 @@ class Policy:
         self.scale = 1.0
         """Size of the leg that it is on, over that of the paper's, if it is for any leg."""
         self._memory_size = _check_signature(self._session, self._layout, origin)
-        memory = {MEMORY: (self._memory_size,)} if self.remembers else {}
+        memory = {MEMORY: (self._memory_size,)} if self._memory_size else {}
         self.seconds = measure_session(self._session, self._layout.shapes | memory, origin)
         self.reset(0)
 
     @staticmethod
-    def load(path: Path, name: str | None = None) -> "Policy":
+    def load(path: Path) -> "Policy":
         """Read a policy file.
 
         Raises:
@@ -220,7 +214,7 @@ class Policy:
             content = path.read_bytes()
         except OSError as error:
             raise PolicyError(f"Cannot read policy file {path}: {error.strerror}.") from error
-        return Policy(content, str(path), name or path.stem)
+        return Policy(content, str(path), path.stem)
 
     @property
     def inputs(self) -> dict[str, tuple[int, ...]]:
@@ -238,11 +232,6 @@ class Policy:
         if self.for_any_leg:
             self.scale = robot.size
 
-    @property
-    def remembers(self) -> bool:
-        """Whether it carries a memory from tick to tick."""
-        return self._memory_size > 0
-
     def check_robot(
         self, robot: Robot, rate: float | None = None, *, other: OtherRobot = "refuse"
     ) -> None:
@@ -251,11 +240,11 @@ class Policy:
         Raises:
             PolicyError: The rate differs, or the robot where that is refused.
         """
-        card = self.card
-        if rate is not None and rate != card.rate:
+        trained = self.card.rate
+        if rate is not None and rate != trained:
             raise PolicyError(
-                f"{self.origin} was trained at {card.rate:g} Hz and cannot run at {rate:g} Hz;"
-                f" set --rate {card.rate:g}."
+                f"{self.origin} was trained at {trained:g} Hz and cannot run at {rate:g} Hz;"
+                f" set --rate {trained:g}."
             )
         self.set_robot(robot)
         sentence = self.stranger(robot, self.origin)
@@ -321,11 +310,10 @@ class Policy:
             self._layout.restart(self._forgotten, measurement)
             self._forgotten = np.arange(0)
         feeds = self._layout.inputs()
-        if self.remembers:
+        if self._memory_size:
             feeds[MEMORY] = self._memory
         torque, *memory = self._session.run(None, feeds)
-        if memory:
-            (self._memory,) = memory
+        self._memory = memory[0] if memory else self._memory
         self._torque = torque.astype(np.float64)
         return self._torque.copy()
 
