@@ -28,9 +28,8 @@ class Experiment:
     twins need 20."""
     methods: tuple[str, ...] = DEFAULT
     """What policies are trained on, the others being compared with the first. Valid: identified,
-    cad, table-1, rail-only, fixed-base-only, two-pass, one-pass, truth; those whose legs differ in
-    training, identified-posterior and randomised; and, not trained, energy-shaping,
-    energy-shaping-tuned, universal, universal-identified."""
+    cad, table-1, truth; those whose legs differ in training, identified-posterior and randomised;
+    and, not trained, energy-shaping, energy-shaping-tuned, universal, universal-identified."""
     seeds: tuple[int, ...] = (0,)
     """Seeds of the trainings, one of each method and twin each."""
     recipe: str = "fast"
@@ -39,8 +38,6 @@ class Experiment:
     """Control steps of experience of a training."""
     seconds: float = 60.0
     """Duration of each recording, s; the paper's are 240 s, a swing per amplitude takes 30 s."""
-    generations: int = 100
-    """Generations of CMA-ES in each pass, for the methods two-pass and one-pass."""
     commands: Heights = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)
     """Apex heights at which the twins are tried, m."""
     repeats: int = 3
@@ -61,7 +58,7 @@ class Chain:
     """
 
     def __init__(self, asked: Experiment) -> None:
-        at_least(1, jobs=asked.jobs, steps=asked.steps, generations=asked.generations)
+        at_least(1, jobs=asked.jobs, steps=asked.steps)
         at_least(1, repeats=asked.repeats, seeds=len(asked.seeds))
         at_least(30, seconds=round(asked.seconds))
         get_recipe(asked.recipe)
@@ -90,46 +87,40 @@ class Chain:
         """Return the robot that a method simulates for a twin: its name or file."""
         if method.truth:
             return twin.source
-        if method.fit:
-            return str(self._file("robots", f"{twin.name}-{method.fit.name}.toml"))
+        if method.fitted:
+            return str(self._file("robots", f"{twin.name}-identified.toml"))
         return method.robot or twin.believed
 
     def identify(self) -> list[Row]:
-        """Record the twins and identify them; return the fits, several methods may share one."""
+        """Record the twins and identify them, if a method asks for it; return the fits."""
+        if not any(method.fitted for method in self.methods):
+            return []
         seconds = self.asked.seconds
-        rigs = sorted({rig for method in self.methods if method.fit for rig in method.fit.rigs})
         files = {
             (twin, rig): self._file("recordings", f"{twin.name}-{rig}.parquet")
             for twin in self.twins
-            for rig in rigs
+            for rig in steps.RIGS
         }
         recorded = do_all(
             (
-                (_beside(file), {"twin": twin.robot.digest, "seconds": seconds},
+                (file.with_suffix(".json"), {"twin": twin.robot.digest, "seconds": seconds},
                  steps.record, twin, rig, seconds, file)
                 for (twin, rig), file in files.items()
             ),
             self.asked.jobs,
         )  # fmt: skip
         digests = {key: row["digest"] for key, row in zip(files, recorded, strict=True)}
-        jobs, names = [], []
-        for fit, twin, method in {
-            (m.fit, twin): (m.fit, twin, m) for m in self.methods for twin in self.twins if m.fit
-        }.values():
-            generations = None if fit.search == "least-squares" else self.asked.generations
+        jobs = []
+        for twin in self.twins:
+            pair = [(twin, rig) for rig in steps.RIGS]
             asked = {
                 "believed": load_robot(twin.believed).digest,
-                "recordings": [digests[twin, rig] for rig in fit.rigs],
-                "search": fit.search,
-                "generations": generations,
+                "recordings": [digests[key] for key in pair],
             }
-            file = Path(self.source(twin, method))
-            recordings = [files[twin, rig] for rig in fit.rigs]
-            jobs.append((_beside(file), asked, steps.fit, twin, recordings, fit.search,
-                         generations or 1, file))  # fmt: skip
-            names.append(fit.name)
-        fits = do_all(jobs, self.asked.jobs)
-        return [{"method": name, **row} for name, row in zip(names, fits, strict=True)]
+            file = self._file("robots", f"{twin.name}-identified.toml")
+            recordings = [files[key] for key in pair]
+            jobs.append((file.with_suffix(".json"), asked, steps.fit, twin, recordings, file))
+        return do_all(jobs, self.asked.jobs)
 
     def train(self) -> list[Row]:
         """Train all policies and tune all gains; return the trainings."""
@@ -149,13 +140,15 @@ class Chain:
         source = self.source(twin, method)
         recipe = get_recipe(self.asked.recipe).replace({"steps": self.asked.steps})
         if method.ranges == "intervals":
-            fitted = json.loads(_beside(Path(source)).read_bytes())["result"]["parameters"]
+            fitted = json.loads(Path(source).with_suffix(".json").read_bytes())["result"][
+                "parameters"
+            ]
             recipe = recipe.replace({"task.randomised": steps.interval_ranges(fitted)})
         else:
             recipe = randomise(recipe, method.ranges)
         asked = {"recipe": repr(recipe), "robot": simulated(source).digest, "seed": seed}
         name = f"{twin.name}-{method.name}"
-        if not method.fit and not method.truth:
+        if not method.fitted and not method.truth:
             name = Path(source).stem + ("" if method.ranges == "none" else f"-{method.ranges}")
         mark = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:8]
         folder = self._file("training", f"{name}-seed{seed}-{mark}")
@@ -199,7 +192,3 @@ class Chain:
 
     def _file(self, kind: str, name: str) -> Path:
         return self.asked.folder / kind / name
-
-
-def _beside(file: Path) -> Path:
-    return file.with_suffix(".json")

@@ -6,28 +6,7 @@ from typing import Literal
 
 from hopping_leg.controllers.registry import ENERGY_SHAPING
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.identify.recording_format import Rig
 from hopping_leg.rl.recipes import Randomise
-
-RIGS: tuple[Rig, ...] = ("fixed-base", "rail")
-
-Search = Literal["least-squares", "two-pass", "one-pass"]
-
-
-@dataclass(frozen=True)
-class Fit:
-    """How the simulation is fitted to recordings of the twin.
-
-    Attributes:
-        name: Of its files; methods may share a fit.
-        rigs: Whose recordings are used.
-        search: ``least-squares`` on positions and torques, the paper's ``two-pass`` CMA-ES on
-            positions, or ``one-pass``, the same over all parameters at once.
-    """
-
-    name: str = "identified"
-    rigs: tuple[Rig, ...] = RIGS
-    search: Search = "least-squares"
 
 
 @dataclass(frozen=True)
@@ -37,7 +16,7 @@ class Method:
     Attributes:
         name: On the command line and in the results.
         meaning: A phrase for tables.
-        fit: How the twin is identified; None if it is not.
+        fitted: Whether the robot is the twin as it is identified from recordings.
         robot: Robot that is trained on without a fit; None takes the one that the twin extends.
         ranges: What every leg in training draws for itself, around the robot; ``intervals`` of
             the fit, or those of ``hop train``.
@@ -50,7 +29,7 @@ class Method:
 
     name: str
     meaning: str
-    fit: Fit | None = None
+    fitted: bool = False
     robot: str | None = None
     ranges: Randomise | Literal["intervals"] = "none"
     truth: bool = False
@@ -61,30 +40,22 @@ class Method:
 METHODS = {
     method.name: method
     for method in (
-        Method("identified", "identified from both recordings", Fit()),
+        Method("identified", "identified from both recordings", fitted=True),
         Method(
             "identified-posterior",
             "identified, every leg drawn from the intervals of the fit",
-            Fit(),
+            fitted=True,
             ranges="intervals",
         ),
         Method("cad", "CAD defaults"),
         Method("table-1", "the paper's Table I", robot="legv2-paper"),
         Method("randomised", "domain randomisation over the twins' ranges", ranges="twins"),
-        Method("rail-only", "identified from the rail alone", Fit("rail-only", rigs=("rail",))),
-        Method(
-            "fixed-base-only",
-            "identified with the base clamped",
-            Fit("fixed-base-only", rigs=("fixed-base",)),
-        ),
-        Method("two-pass", "the paper's two passes of CMA-ES", Fit("two-pass", search="two-pass")),
-        Method("one-pass", "the same CMA-ES in one pass", Fit("one-pass", search="one-pass")),
         Method("truth", "true parameters: what a perfect fit would find", truth=True),
         Method(ENERGY_SHAPING, "energy shaping, shipped gains", untrained=ENERGY_SHAPING),
         Method(
             "energy-shaping-tuned",
             "energy shaping, tuned on what both recordings identify",
-            Fit(),
+            fitted=True,
             untrained=ENERGY_SHAPING,
             tuned=True,
         ),
@@ -92,7 +63,7 @@ METHODS = {
         Method(
             "universal-identified",
             "`universal`, told what both recordings identify",
-            Fit(),
+            fitted=True,
             untrained="universal",
         ),
     )

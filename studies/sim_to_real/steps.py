@@ -9,11 +9,12 @@ from hopping_leg.controllers import Controller, RolloutConfig
 from hopping_leg.controllers.command_schedule import command_range
 from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller
 from hopping_leg.evaluate import entries, runner
-from hopping_leg.identify import cost, excitation, optimizers, plan, play_excitation
+from hopping_leg.identify import excitation, play_excitation
+from hopping_leg.identify.optimizers import SearchOptions
 from hopping_leg.identify.paper_excitation import Strokes, adapt, fixed_base, moving_base
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
-from hopping_leg.identify.recording import Recording, load_recording
+from hopping_leg.identify.recording import load_recording
 from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.result import as_json, save_robot
 from hopping_leg.rl.recipe import Recipe
@@ -24,8 +25,9 @@ from hopping_leg.sim import Measurement
 from hopping_leg.sim.randomization import RANDOMIZABLE, Range
 from studies.energy_shaping.tune import Tune
 from studies.shared import Row
-from studies.sim_to_real.methods import RIGS, Search
 from studies.sim_to_real.twins import Twin, disturbance_of, simulated
+
+RIGS: tuple[Rig, ...] = ("fixed-base", "rail")
 
 FIRST_SEED = 1000
 """First seed of the trials; no seed from here on has chosen anything."""
@@ -60,17 +62,19 @@ def _strokes(rig: Rig, seconds: float) -> Strokes:
     return fixed_base(swings=swings, duration=seconds)
 
 
-def fit(
-    twin: Twin, recordings: Sequence[Path], search: Search, generations: int, file: Path
-) -> Row:
+def fit(twin: Twin, recordings: Sequence[Path], file: Path) -> Row:
     """Identify a twin and write the robot file.
 
     Returns:
         Errors on data that the fit has not seen, before and after, and the parameters.
     """
-    believed, loaded = load_robot(twin.believed), [load_recording(path) for path in recordings]
-    options = _fit_options(loaded, believed, search, generations)
-    identified = identify(loaded, believed, options=options)
+    believed = load_robot(twin.believed)
+    links = {"thigh.inertia": believed.thigh.inertia, "shank.inertia": believed.shank.inertia}
+    options = IdentifyOptions(
+        bounds={k: (v / _INERTIA_FACTOR, v * _INERTIA_FACTOR) for k, v in links.items()},
+        effort=SearchOptions(tolerance=_USUAL_TOLERANCE),
+    )
+    identified = identify([load_recording(path) for path in recordings], believed, options=options)
     save_robot(identified, file, twin.believed)
     found = as_json(identified)
     before, after, truth = found["start_validation"], found["validation"], _truth(twin)
@@ -78,6 +82,7 @@ def fit(
     kept = ("name", "unit", "start", "value", "interval_low", "interval_high", "at_bound",
             "bound_low", "bound_high")  # fmt: skip
     return {
+        "method": "identified",
         "twin": twin.name,
         **{f"{name}_before": before[name] for name in errors},
         **{name: after[name] for name in errors},
@@ -86,21 +91,6 @@ def fit(
             for row in found["parameters"]
         ],
     }
-
-
-def _fit_options(
-    recordings: list[Recording], believed: Robot, search: Search, generations: int
-) -> IdentifyOptions:
-    links = {"thigh.inertia": believed.thigh.inertia, "shank.inertia": believed.shank.inertia}
-    options = IdentifyOptions(
-        bounds={k: (v / _INERTIA_FACTOR, v * _INERTIA_FACTOR) for k, v in links.items()},
-        search=search,
-        effort=optimizers.SearchOptions(tolerance=_USUAL_TOLERANCE, generations=generations),
-    )
-    if search != "one-pass":
-        return options
-    names = plan.make_plan(recordings, believed, search="two-pass").parameters.names
-    return replace(options, search="cma", parameters=tuple(names), scoring=cost.Scoring())
 
 
 def _truth(twin: Twin) -> Callable[[str], float | None]:

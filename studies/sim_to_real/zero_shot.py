@@ -1,6 +1,6 @@
 """Controllers on legs that they have never met, without any tuning: pairs of leg and command."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -122,27 +122,24 @@ def summarize(pairs: Sequence[Row], controllers: Sequence[str]) -> list[Row]:
 
     Shares are of pairs; intervals are 95 % over legs.
     """
-    shaped = {_place(row): row for row in pairs if row["controller"] == ENERGY_SHAPING}
+    shaped = {_place(r): r["mean_abs_error_m"] for r in pairs if r["controller"] == ENERGY_SHAPING}
     rows = []
     for name in controllers:
         own = [row for row in pairs if row["controller"] == name and row["reached"]]
-        errors, heights = (
-            np.array([row[name] for row in own]) for name in ("median_abs_error_m", "command_m")
-        )
-        closer = [
-            row["mean_abs_error_m"] < shaped[_place(row)]["mean_abs_error_m"]
-            for row in own
-            if _place(row) in shaped
-        ]
+        beside = [row for row in own if _place(row) in shaped]
+        closer = [row["mean_abs_error_m"] < shaped[_place(row)] for row in beside]
+        errors = [row["median_abs_error_m"] for row in own]
         rows.append({
             "controller": name,
             "pairs": len(own),
-            **_share(own, "within_5mm", errors <= 0.005),
-            **_share(own, "within_10mm", errors <= 0.010),
-            **_share(own, "within_3_percent", errors <= 0.03 * heights),
+            **_share(own, "within_5mm", lambda r: r["median_abs_error_m"] <= 0.005),
+            **_share(own, "within_10mm", lambda r: r["median_abs_error_m"] <= 0.010),
+            **_share(
+                own, "within_3_percent", lambda r: r["median_abs_error_m"] <= 0.03 * r["command_m"]
+            ),
             "closer_than_energy_shaping": float(np.mean(closer)) if closer else None,
             "median_abs_error_m": float(np.median(errors)) if own else None,
-            "worst_abs_error_m": float(errors.max()) if own else None,
+            "worst_abs_error_m": max(errors, default=None),
             "median_std_m": float(np.median([r["std_m"] for r in own if r["std_m"] is not None])),
             "would_be_stopped": float(np.mean([row["would_be_stopped"] for row in own])),
             **{key: sum(row[key] for row in own) for key in ("skipped_hops", *_CONTACTS)},
@@ -150,19 +147,20 @@ def summarize(pairs: Sequence[Row], controllers: Sequence[str]) -> list[Row]:
     return rows
 
 
-def _share(rows: Sequence[Row], name: str, holds: BoolArray) -> dict[str, float | None]:
+def _share(rows: Sequence[Row], name: str, holds: Callable[[Row], bool]) -> Row:
     if not rows:
         return {name: None}
     legs: dict[str, list[bool]] = {}
-    for row, one in zip(rows, holds.tolist(), strict=True):
-        legs.setdefault(row["robot"], []).append(one)
+    for row in rows:
+        legs.setdefault(row["robot"], []).append(holds(row))
     shares = list(legs.values())
 
     def mean(index: Sequence[int]) -> float:
         return float(np.mean([one for i in index for one in shares[i]]))
 
-    low, high = statistics.bootstrap(range(len(shares)), mean, 0, statistics.LEAST_TWINS)
-    return {name: float(holds.mean()), f"{name}_low": float(low), f"{name}_high": float(high)}
+    everyone = range(len(shares))
+    low, high = statistics.bootstrap(everyone, mean, 0, statistics.LEAST_TWINS)
+    return {name: mean(everyone), f"{name}_low": float(low), f"{name}_high": float(high)}
 
 
 def _place(row: Row) -> tuple[str, float]:

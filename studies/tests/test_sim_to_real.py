@@ -128,9 +128,9 @@ def test_legs_are_drawn_from_the_intervals_of_the_fit(tmp_path):
 
 @pytest.mark.slow
 def test_a_twin_is_recorded_to_its_stops_and_identified_from_that_alone(tmp_path):
-    one = Chain(Experiment(("1",), ("rail-only",), folder=tmp_path, seconds=30.0))
+    one = Chain(Experiment(("1",), ("identified",), folder=tmp_path, seconds=30.0))
     (fit,) = one.identify()
-    assert (fit["method"], fit["twin"]) == ("rail-only", "twin-0")
+    assert (fit["method"], fit["twin"]) == ("identified", "twin-0")
     recording = load_recording(tmp_path / "recordings" / "twin-0-rail.parquet")
     assert recording.array("position").min() < one.twins[0].robot.knee.stop_lower
     truth = {row["name"]: row["truth"] for row in fit["parameters"]}
