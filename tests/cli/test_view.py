@@ -20,7 +20,6 @@ pytest.importorskip("viser", reason="the extra 'view' is not installed")
         (["--box", "none"], "There is no none"),
         (["--trace", "a.parquet", "--box", "runs"], "exclude each other"),
         (["--port", "70000"], "between 0 and 65535"),
-        (["--detail", "0"], "--detail is 0 but must lie above 0"),
     ],
 )
 def test_a_bad_wish_gets_a_sentence(arguments, sentence, refused):

@@ -1,6 +1,5 @@
 import io
 
-import matplotlib.pyplot as plt
 import numpy as np
 import polars as pl
 import pytest
@@ -14,7 +13,7 @@ from hopping_leg.evaluate.report import draw_report_figures
 from hopping_leg.evaluate.trials import load_run
 from hopping_leg.evaluate.video import CLIP_SECONDS, FRAME_RATE, fixed_traces, render_hops, sample
 from hopping_leg.figure_style import INCHES, encode, fit_width, to_svg
-from hopping_leg.hop_detection import FLIGHT_CLEARANCE, find_hops
+from hopping_leg.hop_detection import find_hops
 from hopping_leg.trace import Trace
 
 
@@ -63,15 +62,6 @@ def test_controllers_beside_each_other_share_their_axes_and_keep_their_colours(f
         assert drawn.get_color() == own
     five = ["mine", "precise", "a", "b", "energy-shaping"]
     assert len(set(controller_colours(five).values())) == 5
-
-
-def test_phase_space_shows_flight_and_stance_of_ten_seconds(fixed):
-    flight, stance = drawing.draw_phase_space({"spring": fixed}).axes[:2]
-    points = [len(axes.collections[0].get_offsets()) for axes in (flight, stance)]
-    time = fixed.column("time_s")
-    shown = (time >= metrics.START_SECONDS) & (time < metrics.START_SECONDS + 10)
-    in_flight = int((fixed.column("foot_clearance_m")[shown] >= FLIGHT_CLEARANCE).sum())
-    assert points == [in_flight, int(shown.sum()) - in_flight]
 
 
 def test_the_gallery_from_stored_traces_is_the_reports(judged, tmp_path):
@@ -129,19 +119,9 @@ def test_a_printed_figure_has_its_width_readable_text_and_its_legend_inside(figu
     assert figure.get_figwidth() == INCHES[width]
     assert figure.axes[0].xaxis.label.get_fontsize() == pytest.approx(points)
     assert [t.get_text() for t in figure.legends[0].get_texts()] == ["one", "two", "three", "four"]
-    encode(figure, "pdf", width)
+    assert encode(figure, "pdf", width).startswith(b"%PDF")
     box = figure.legends[0].get_window_extent()
     assert 0 <= box.x0 < box.x1 <= figure.bbox.width
-
-
-def test_every_format_and_the_same_bytes_twice(figure):
-    assert encode(figure, "pdf").startswith(b"%PDF")
-    assert encode(figure, "pdf") == encode(figure, "pdf")
-    assert b"<svg" in encode(figure, "svg")
-    assert encode(figure, "svg") == encode(figure, "svg")
-    assert encode(figure, "png").startswith(b"\x89PNG")
-    image = plt.imread(io.BytesIO(encode(figure, "png", "column")))
-    assert image.shape[1] == round(300 * INCHES["column"])
 
 
 @pytest.fixture(scope="module")

@@ -72,15 +72,6 @@ def test_contacts_are_counted_as_events_even_while_the_run_settles():
     assert window.base_contacts == 1
 
 
-def test_torques_are_those_of_the_motors():
-    trace = sine_trace()
-    hip = np.zeros(len(trace.table))
-    hip[100] = -7.0
-    (window,) = measure(with_column(trace, "hip_torque_nm", hip))
-    assert window.peak_torque.tolist() == [7.0, 0.0]
-    assert len(window.part.table) == len(hip)
-
-
 def test_a_hop_missed_right_after_a_switch_is_seen_in_the_whole_run():
     trace = sine_trace(switch=5.0)
     clearance = trace.column("foot_clearance_m")
@@ -140,9 +131,3 @@ def test_a_run_without_hops_stays_in_median_distance_and_interval():
     assert row.median_error_low_m == pytest.approx(-0.09)
     assert row.median_error_high_m == pytest.approx(0.01, abs=1e-4)
     assert row.std_m < 1e-3, "the spread is of the hops that there were"
-
-
-def test_neighbours_are_compared_run_by_run(judged):
-    (found,) = judged.evaluation.neighbours[0].neighbours
-    assert found.runs == 4, "two fixed runs and two sequences"
-    assert found.cliffs_delta_low <= found.cliffs_delta <= found.cliffs_delta_high

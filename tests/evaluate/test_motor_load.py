@@ -1,5 +1,3 @@
-import dataclasses
-
 import numpy as np
 import polars as pl
 import pytest
@@ -26,13 +24,6 @@ def part(robot, **columns):
 
 def torque(robot, hip, knee):
     return part(robot, hip_mean_square_torque=hip**2, knee_mean_square_torque=knee**2)
-
-
-def test_a_resting_leg_asks_nothing(robot):
-    load = motor_load([part(robot)], robot)
-    values = dataclasses.asdict(load)
-    assert values.pop("thermal_minutes") == np.inf
-    assert not any(values.values())
 
 
 def test_the_hotter_motor_limits_and_the_rated_torque_never_does(robot):

@@ -64,29 +64,6 @@ def test_the_served_page_and_its_websocket_are_guarded():
                 asyncio.run(knock(origin))
 
 
-_KNOCK = """address => new Promise(done => {
-  const socket = new WebSocket(address, ["viser-v0"]);
-  socket.onopen = () => done("open");
-  socket.onerror = socket.onclose = () => done("refused");
-})"""
-_FRAME = """address => new Promise(done => {
-  const frame = document.createElement("iframe");
-  [frame.src, frame.onload] = [address, done];
-  document.body.append(frame);
-})"""
-
-
-@pytest.mark.slow
-def test_a_page_of_another_site_can_neither_connect_nor_show_it(foreign):
-    with Served() as (host, port):
-        assert foreign.evaluate(_KNOCK, f"ws://{host}:{port}") == "refused"
-        foreign.evaluate(f"address => void ({_FRAME})(address)", f"http://{host}:{port}")
-        foreign.wait_for_timeout(1000)
-        assert not any("viser" in frame.content() for frame in foreign.frames[1:])
-        foreign.goto(f"http://{host}:{port}", wait_until="commit")
-        assert foreign.evaluate(_KNOCK, f"ws://{host}:{port}") == "open"  # its own page may
-
-
 class Served:
     """A live simulation's page."""
 

@@ -191,12 +191,3 @@ def test_a_run_on_the_leg_is_followed(page, tmp_path):
         box.close()
         page.get_by_text("the leg is shown standing").wait_for()
         assert follow.now == pytest.approx(199 / 200)
-
-
-def test_fewer_pixels_are_drawn_where_asked_for(page):
-    viewer = Viewer(LiveSimulation(("fast",), ROBOT, 0.3), ROBOT, port=0, detail=0.25)
-    with running(viewer):
-        wait_for_leg(page, viewer)
-        canvas = page.locator("canvas[data-engine]")
-        shown = canvas.bounding_box()
-        until(lambda: canvas.evaluate("c => c.height") == pytest.approx(shown["height"] / 4, abs=1))

@@ -1,11 +1,8 @@
-import os
-
 import numpy as np
 import polars as pl
 import pytest
 
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.controllers.rollout import RolloutConfig, rollout
 from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder, FlightRecorderTail
 from hopping_leg.deploy.loop import columns
 from hopping_leg.errors import RobotError, TraceError, UsageError
@@ -103,16 +100,6 @@ def test_what_hop_deploy_records_is_shown_with_the_estimate_of_the_controller(tm
     assert "estimate" in track.note
 
 
-def test_of_boxes_written_in_one_tick_the_last_by_name_is_followed(tmp_path):
-    for number in (2, 1):
-        finished(tmp_path / f"fast-{number}{SUFFIX}", 3)
-    for number in (1, 2):
-        os.utime(tmp_path / f"fast-{number}{SUFFIX}", ns=(10**18, 10**18))
-    follow = RecorderSource(tmp_path)
-    follow.advance(1.0)
-    assert follow.notices[-1] == f"Following fast-2{SUFFIX}."
-
-
 def test_a_folder_waits_for_a_run_and_turns_to_a_newer_one(tmp_path):
     follow = RecorderSource(tmp_path)
     follow.advance(1.0)
@@ -146,33 +133,21 @@ def stored(path, seconds=1.0, start=0.0, **header):
     return path
 
 
-def test_a_replay_plays_and_begins_again(tmp_path):
-    replay = ReplaySource((stored(tmp_path / "a.parquet", start=7.0),))
+def test_a_replay_plays_and_begins_again_and_the_shorter_trace_waits(tmp_path):
+    short = stored(tmp_path / "b.parquet", 0.5, robot_digest=load_robot("legv2").digest)
+    replay = ReplaySource((stored(tmp_path / "a.parquet", start=7.0, robot_digest="0"), short))
+    assert len(replay.notices) == 1
+    assert "a.parquet was recorded from other parameters" in replay.notices[0]
     assert replay.length == pytest.approx(1.0)
     replay.advance(0.5)
     assert replay.tracks[0].moment(replay.now)[0] == pytest.approx(0.3)
-    replay.advance(0.6)
+    replay.advance(0.2)
+    assert replay.tracks[1].moment(replay.now)[0] == pytest.approx(0.4)
+    replay.advance(0.4)
     assert replay.now == 0.0
     for wanted, shown in ((-1.0, 0.0), (0.3, 0.3), (5.0, 1.0)):
         replay.seek(wanted)
         assert replay.now == pytest.approx(shown)
-
-
-def test_two_traces_begin_together_and_the_shorter_one_waits(tmp_path):
-    paths = (stored(tmp_path / "a.parquet"), stored(tmp_path / "b.parquet", 2.0, start=3.0))
-    replay = ReplaySource(paths)
-    replay.seek(1.5)
-    heights = [track.moment(replay.now)[0] for track in replay.tracks]
-    assert replay.length == pytest.approx(2.0)
-    np.testing.assert_allclose(heights, [0.4, 0.35])
-
-
-def test_other_parameters_are_told(tmp_path):
-    digest = load_robot("legv2").digest
-    same = stored(tmp_path / "same.parquet", robot_digest=digest)
-    other = stored(tmp_path / "other.parquet", robot_digest="0" * 16)
-    assert ReplaySource((same,)).notices == []
-    assert "other parameters" in ReplaySource((other,)).notices[0]
 
 
 def test_what_cannot_be_replayed_is_refused_and_an_unknown_robot_asks_for_its_file(tmp_path):
@@ -200,17 +175,13 @@ def rows(count, **given):
 
 
 def test_a_bounded_track_keeps_its_newest_rows_in_order():
-    track = Track("x", ROBOT, depth=10)
-    for tick in range(137):
-        track.append(tick / 200, rows(1, height_m=float(tick))[:, 0])
-    assert 10 <= len(track) <= 20
-    newest = np.arange(137 - len(track), 137)
-    np.testing.assert_allclose(track.time, newest / 200)
-    np.testing.assert_array_equal(track.field("height_m"), newest)
-    unbounded = Track("x", ROBOT)
-    for part in range(5):
-        unbounded.extend(np.arange(2000) + 2000.0 * part, rows(2000))
-    np.testing.assert_array_equal(unbounded.time, np.arange(10000.0))
+    track, unbounded = Track("x", ROBOT, depth=10), Track("x", ROBOT)
+    for tick in range(37):
+        for one in (track, unbounded):
+            one.extend(np.array([tick / 200]), rows(1, height_m=float(tick)))
+    np.testing.assert_allclose(track.time, np.arange(27, 37) / 200)
+    np.testing.assert_array_equal(track.field("height_m"), np.arange(27, 37))
+    np.testing.assert_array_equal(unbounded.field("height_m"), np.arange(37))
 
 
 def test_a_moment_lies_between_its_rows_and_samples_outside_of_them_are_unknown():
@@ -224,21 +195,6 @@ def test_a_moment_lies_between_its_rows_and_samples_outside_of_them_are_unknown(
     np.testing.assert_array_equal(found, [np.nan, 0.3, 0.3, 0.4, np.nan])
     assert track.latest("command_m", 5.0) == 0.4
     assert np.isnan(track.latest("command_m", 0.5))
-
-
-def test_a_simulated_trace_is_shown_as_recorded(tmp_path):
-    controller = load_controller("energy-shaping", ROBOT)
-    run = rollout(controller, RolloutConfig(ROBOT, threads=1), np.full((300, 1), 0.3), seed=0)
-    simulated = run.trace(0)
-    path = tmp_path / "run.parquet"
-    simulated.save(path)
-    (track,) = ReplaySource((path,)).tracks
-    assert track.name == "energy-shaping"
-    assert track.note == ""
-    np.testing.assert_array_equal(track.field("height_m"), simulated.column("height_m"))
-    apexes = track.apexes(1.5, 1.5)
-    assert len(apexes)
-    assert np.all(apexes > 0.2)
 
 
 def test_missing_angles_stay_as_they_were():

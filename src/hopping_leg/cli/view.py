@@ -29,8 +29,6 @@ from hopping_leg.errors import UsageError
 if TYPE_CHECKING:
     from hopping_leg.viewer.data_source import DataSource
 
-_MOST_DETAIL = 4.0
-
 
 @dataclass(frozen=True)
 class View:
@@ -51,9 +49,6 @@ class View:
     """A flight recording to follow instead, or a folder whose newest one is followed."""
     port: int = 8080
     """Port of this computer alone; if it is in use, the next free one."""
-    detail: float | None = None
-    """Pixels drawn per pixel of the screen, each way; default: as many as the browser keeps up
-    with."""
     browser: bool = True
     """Whether to open the page where there is a screen."""
     seconds: float = float("inf")
@@ -62,18 +57,13 @@ class View:
 
 def run(args: View) -> None:
     """Serve the page until Ctrl-C."""
-    if args.detail is not None and not 0 < args.detail <= _MOST_DETAIL:
-        raise UsageError(
-            f"--detail is {args.detail:g} but must lie above 0 and be at most {_MOST_DETAIL:g};"
-            " 1 draws every pixel of the screen."
-        )
     from hopping_leg.controllers.registry import robot_of
 
     source = _source(args)
     from hopping_leg.viewer.viewer import Viewer
 
     robot = args.robot or robot_of(args.controllers)
-    viewer = Viewer(source, robot, port=args.port, detail=args.detail)
+    viewer = Viewer(source, robot, port=args.port)
     say(f"Open {viewer.address} in a browser; Ctrl-C stops.")
     screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if args.browser and (screen or sys.platform in ("win32", "darwin")):

@@ -137,7 +137,8 @@ class LiveSimulation:
         self._push_ticks = max(self._push_ticks - 1, 0)
         for leg, track in zip(self._legs, self.tracks, strict=True):
             try:
-                track.append(self.now, leg.tick(self.height, force))
+                row = leg.tick(self.height, force)
+                track.extend(np.array([self.now]), row[:, None])
             except PhysicsError as error:
                 self.notices.append(f"{error} The leg stands up again.")
                 leg.stand(self.height)

@@ -1,6 +1,5 @@
 """Inputs of the page, the queue that carries them to the thread that simulates, its clock."""
 
-from collections import deque
 from collections.abc import Callable, Collection, Coroutine
 from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
@@ -243,8 +242,6 @@ SPEEDS = (0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0)
 LONGEST = 0.1
 """Seconds that are made up for after a stall; more is left out."""
 
-_WINDOW = 2.0
-
 
 class PlaybackClock:
     """Turns time on the wall into time to be shown, in whole ticks of so many seconds."""
@@ -254,44 +251,23 @@ class PlaybackClock:
         self._tick = tick
         self._steps = 0
         self._owed = 0.0
-        self._past: deque[tuple[float, float]] = deque()
-        self._wall = self._shown = 0.0
 
-    def step(self, ticks: int = 1) -> None:
-        """Pause, and show that many ticks more."""
+    def step(self) -> None:
+        """Pause, and show a tick more."""
         self.paused = True
-        self._steps += ticks
+        self._steps += 1
 
     def due(self, elapsed: float) -> float:
         """Return how much time to show, s, given the time on the wall since the last call, s."""
-        ticks = self._steps
-        self._steps = 0
+        ticks, self._steps = self._steps, 0
         if self.paused:
             self._owed = 0.0
-            self._past.clear()
-            return ticks * self._tick
-        self._owed += min(elapsed, LONGEST) * self.speed
-        ticks += int(self._owed / self._tick + 1e-9)
-        self._owed = max(self._owed - ticks * self._tick, 0.0)
-        self._wall += elapsed
-        self._shown += ticks * self._tick
-        self._past.append((self._wall, self._shown))
-        while self._wall - self._past[0][0] > _WINDOW:
-            self._past.popleft()
+        else:
+            self._owed += min(elapsed, LONGEST) * self.speed
+            whole = int(self._owed / self._tick + 1e-9)
+            self._owed = max(self._owed - whole * self._tick, 0.0)
+            ticks += whole
         return ticks * self._tick
-
-    @property
-    def real_time(self) -> float:
-        """Shown over due time in the last two seconds: 1 keeps up, NaN while paused."""
-        if len(self._past) < 2:
-            return float("nan")
-        wall, shown = self._past[0]
-        return (self._shown - shown) / (self._wall - wall) / self.speed
-
-    def set_speed(self, speed: float) -> None:
-        """Go on at another speed."""
-        self.speed = speed
-        self._past.clear()
 
 
 class TimeControls:
@@ -306,7 +282,11 @@ class TimeControls:
         speed = gui.add_dropdown("Speed", names, initial_value="1", hint="1 is real time")
         self._pause.on_click(queue.from_page(self._toggle))
         step.on_click(queue.from_page(self._step))
-        speed.on_update(queue.from_page(lambda: clock.set_speed(float(chosen(speed, names)))))
+
+        def set_speed() -> None:
+            clock.speed = float(chosen(speed, names))
+
+        speed.on_update(queue.from_page(set_speed))
         queue.add_keys(
             gui, ("Pause or go on", "space", self._toggle), ("Single step", "S", self._step)
         )

@@ -4,9 +4,8 @@ A live simulation appends rows as it goes, a replay has them all, a run on the r
 outside; scene and plots know nothing but tracks.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
+import polars as pl
 
 from hopping_leg import hop_detection
 from hopping_leg.arrays import Array
@@ -26,10 +25,8 @@ FIELDS = (
 )
 """What a row holds beside its time; names are those of traces. ``phase`` is the controller's."""
 
-_PLACE = {name: row for row, name in enumerate(FIELDS)}
 _ANGLES = ("hip_position_rad", "knee_position_rad")
 _ESTIMATE = "estimated_height_m"
-_FIRST_ROOM = 4096
 _APEX_SECONDS = 3.0
 
 
@@ -39,46 +36,35 @@ class Track:
     Args:
         name: Of who controls the leg.
         robot: The leg.
-        depth: Rows that are kept at least; older ones are forgotten. None keeps all.
+        depth: Rows that are kept; older ones are forgotten. 0 keeps all.
 
     Attributes:
         note: What the reader should know of where the rows come from.
     """
 
-    def __init__(self, name: str, robot: Robot, *, depth: int | None = None) -> None:
+    def __init__(self, name: str, robot: Robot, *, depth: int = 0) -> None:
         self.name, self.robot, self.note = name, robot, ""
         self._depth = depth
-        self._rows = np.empty((1 + len(FIELDS), 2 * depth if depth else _FIRST_ROOM))
-        self._count = 0
+        self._rows = np.empty((1 + len(FIELDS), 0))
 
     def __len__(self) -> int:
-        return self._count
+        return self._rows.shape[1]
 
     @property
     def time(self) -> Array:
         """Time of each row, s, (rows,)."""
-        return self._rows[0, : self._count]
+        time: Array = self._rows[0]
+        return time
 
     def field(self, name: str) -> Array:
         """Return one of ``FIELDS``, (rows,)."""
-        return self._rows[1 + _PLACE[name], : self._count]
-
-    def append(self, time: float, values: Sequence[float] | Array) -> None:
-        """Add a row that is later than all others; ``values`` are in the order of ``FIELDS``."""
-        self.extend(np.array([time]), np.asarray(values, dtype=np.float64)[:, None])
+        values: Array = self._rows[1 + FIELDS.index(name)]
+        return values
 
     def extend(self, time: Array, values: Array) -> None:
-        """Add rows: times (rows,) and values (fields, rows)."""
-        new, room = len(time), self._rows.shape[1]
-        if self._count + new > room:
-            keep = self._count if self._depth is None else min(self._count, self._depth)
-            grown = np.empty((len(self._rows), max(room, 2 * (keep + new))))
-            grown[:, :keep] = self._rows[:, self._count - keep : self._count]
-            self._rows, self._count = grown, keep
-        into = slice(self._count, self._count + new)
-        self._rows[0, into] = time
-        self._rows[1:, into] = values
-        self._count += new
+        """Add rows that are later than all others: times (rows,) and values (fields, rows)."""
+        grown = np.concatenate([self._rows, np.vstack([time, values])], axis=1)
+        self._rows = grown[:, -self._depth :]
 
     def extend_by_trace(self, trace: Trace) -> None:
         """Add the rows of a trace; ``note`` says what height is shown where none was measured.
@@ -91,8 +77,10 @@ class Track:
         known, unknown = trace.table.columns, np.full(len(trace.table), np.nan)
         columns = {name: trace.column(name) if name in known else unknown for name in FIELDS}
         for name in _ANGLES:
-            last = float(self.field(name)[-1]) if self._count else None
-            columns[name] = _filled(columns[name], last)
+            before = self.field(name)[-1:] if len(self) else [np.nan]
+            angle = pl.Series(np.append(before, columns[name])).fill_nan(None)
+            angle = angle.fill_null(strategy="forward").fill_null(strategy="backward").fill_null(0)
+            columns[name] = angle.to_numpy()[1:]
         if not np.isfinite(columns["height_m"]).any():
             q = np.stack([columns[name] for name in _ANGLES], axis=-1)
             columns["height_m"] = kinematics.stance_height(self.robot, q)
@@ -147,15 +135,3 @@ def in_flight(clearance: Array) -> Array:
         (clearance >= hop_detection.FLIGHT_CLEARANCE).astype(np.float64),
         np.nan,
     )
-
-
-def _filled(values: Array, before: float | None) -> Array:
-    """Return values with each gap filled by what came before it."""
-    known = np.isfinite(values)
-    if known.all():
-        return values
-    last = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
-    if before is None:
-        before = float(values[known][0]) if known.any() else 0.0
-    filled: Array = np.where(last < 0, before, values[last])
-    return filled

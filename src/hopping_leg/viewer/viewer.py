@@ -32,26 +32,17 @@ class Viewer:
         source: What is shown.
         robot: Name or file that a live simulation was started with.
         port: Port to listen at; if it is in use, the next free one.
-        detail: Pixels that the page draws per pixel of the screen, each way; None lets it draw as
-            many as it keeps up with.
 
     Raises:
         UsageError: There is no such port.
     """
 
     def __init__(
-        self,
-        source: data_source.DataSource,
-        robot: str = "",
-        *,
-        port: int = 8080,
-        detail: float | None = None,
+        self, source: data_source.DataSource, robot: str = "", *, port: int = 8080
     ) -> None:
         self._source = source
         self._server = _serve(port)
         self.address = f"http://{_HOST}:{self._server.get_port()}"
-        if detail is not None:
-            self.address += f"/?fixedDpr={detail:g}"
         self.clock = panels.PlaybackClock(1 / CONTROL_RATE)
         self._queue = panels.GuiQueue()
         gui = self._server.gui
@@ -73,8 +64,7 @@ class Viewer:
         panel.dock_right()
         panel.set_width(390)
         self._scene = scene.Scene(self._server)
-        if detail is None:
-            self._server.on_client_connect(_adapt_resolution)
+        self._server.on_client_connect(_adapt_resolution)
         self.frames = 0
         self._stopped = False
 
@@ -139,9 +129,7 @@ class Viewer:
                 lines.append(html.escape(track.note))
         if isinstance(source, live_leg.LiveSimulation):
             lines.insert(0, f'Commanded: <b><span id="command">{source.height:.3f}</span> m</b>')
-        real_time = self.clock.real_time
-        keeps = "" if math.isnan(real_time) else f", real time {real_time:.2f}"
-        lines.append(f'<span style="color:#77767b">{source.now:.2f} s{keeps}</span>')
+        lines.append(f'<span style="color:#77767b">{source.now:.2f} s</span>')
         return f'<div style="padding:0.4em 1em;line-height:1.5">{"<br>".join(lines)}</div>'
 
 
