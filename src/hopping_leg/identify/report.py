@@ -1,7 +1,8 @@
 """The report of an identification: one HTML page that holds everything and needs nothing."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -11,18 +12,17 @@ from matplotlib.figure import Figure
 from hopping_leg.arrays import Array
 from hopping_leg.figure_style import TORQUE_MAP, WIDTH, colour, styled
 from hopping_leg.html_page import Column, page_template, svg_uri, table
-from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json, warning
-from hopping_leg.identify.validation import RESTART, Overlay, overlays, rms
+from hopping_leg.identify.validation import RESTART, Overlay, overlays
 from hopping_leg.io import Tree
 from hopping_leg.robot import JOINTS, load_robot, load_tree
 
-_CAD, _PAPER = "legv2", "legv2-paper"
+_PAPER = "legv2-paper"
 _UNITS = {"rad": ("mrad", 1e3), "N m": ("N m", 1.0)}
 """What is shown for an SI unit, and how many of them it is."""
 _MOST = 12  # recordings drawn, those that fit worst
 _SHOWN = 6.0  # longest stretch that is drawn, s
-_PANELS = [(quantity, joint) for quantity in ("position", "torque") for joint in (0, 1)]
+_PANELS = {"position": "rad", "torque": "N m"}
 
 
 def write_fit_report(identified: Identified, command: str = "", threads: int = 0) -> bytes:
@@ -39,7 +39,6 @@ def write_fit_report(identified: Identified, command: str = "", threads: int = 0
         parameters=parameter_table(identified),
         statements=known.statements,
         correlations=svg_uri(draw_correlations(known.names, known.correlation)),
-        recordings=recording_table(drawn),
         fits=[_fit(overlay) for overlay in _worst(drawn)],
         left_out=max(0, len(drawn) - _MOST),
         provenance=_provenance(as_json(identified)),
@@ -56,47 +55,21 @@ def quality_table(identified: Identified) -> Markup:
 
 
 def parameter_table(identified: Identified) -> Markup:
-    """Return every parameter beside its start, CAD and the paper's Table I."""
-    references = _references(identified)
+    """Return every parameter beside its start and, of the paper's leg, the paper's Table I."""
     columns = [
         Column("parameter", lambda r: r["name"]),
         Column("unit", lambda r: r["unit"]),
         Column("identified", lambda r: f"{r['value']:.4g}", lambda r: r["at_bound"]),
         Column("95 % interval", _interval, _untold),
         Column(f"start: {identified.start.robot.name}", lambda r: f"{r['start']:.4g}"),
+        Column("bounds", lambda r: f"{_number(r['bound_low'])} .. {_number(r['bound_high'])}"),
     ]
-    columns += [Column(name, partial(_looked_up, values)) for name, values in references.items()]
-    columns.append(
-        Column("bounds", lambda r: f"{_number(r['bound_low'])} .. {_number(r['bound_high'])}")
-    )
+    paper, robot = load_robot(_PAPER), identified.start.robot
+    if (paper.thigh.length, paper.shank.length) == (robot.thigh.length, robot.shank.length):
+        known = _table_one(load_tree(_PAPER))
+        heading = f"paper's Table I ({_PAPER})"
+        columns.append(Column(heading, lambda r: _number(known.get(r["name"], np.nan), 4)))
     return table(columns, parameters_json(identified))
-
-
-def recording_table(drawn: list[Overlay]) -> Markup:
-    """Return each held-out recording's errors before and after the fit."""
-    columns = [
-        Column("recording", lambda o: o.recording.name),
-        Column("rig", lambda o: o.recording.metadata.rig),
-    ]
-    for quantity, si in (("position", "rad"), ("torque", "N m")):
-        unit, factor = _UNITS[si]
-        for index, when in enumerate(("before", "after")):
-            heading = f"{quantity} {when} / {unit}: hip, knee"
-            columns.append(Column(heading, partial(_rms_text, quantity, index, factor)))
-    return table(columns, drawn)
-
-
-def _references(identified: Identified) -> dict[str, Mapping[str, float]]:
-    """Return what other files say of the same leg, by heading; none for another leg."""
-    cad, robot = load_robot(_CAD), identified.start.robot
-    links = ("thigh", "shank")
-    if any(getattr(cad, link).length != getattr(robot, link).length for link in links):
-        return {}
-    found: dict[str, Mapping[str, float]] = {}
-    if robot.digest != cad.digest:
-        names = [n for n in identified.identifiability.names if not n.startswith("drive.")]
-        found[f"CAD ({_CAD})"] = {name: LegHypothesis(cad).get(name) for name in names}
-    return found | {f"paper's Table I ({_PAPER})": _table_one(load_tree(_PAPER))}
 
 
 def _table_one(tree: Tree, prefix: str = "") -> dict[str, float]:
@@ -110,8 +83,8 @@ def _table_one(tree: Tree, prefix: str = "") -> dict[str, float]:
 
 
 def _worst(drawn: list[Overlay]) -> list[Overlay]:
-    squares = (np.square(overlay.errors("position")[-1]) for overlay in drawn)
-    errors = [float(np.nansum(s) / max(1, np.isfinite(s).sum())) for s in squares]
+    """Return the recordings that fit worst, in their order."""
+    errors = [float(np.nanmean(np.square(o.errors("position")[-1]))) for o in drawn]
     ranked = sorted(range(len(drawn)), key=lambda index: errors[index], reverse=True)
     return [drawn[index] for index in sorted(ranked[:_MOST])]
 
@@ -129,23 +102,17 @@ def _fit(overlay: Overlay) -> dict[str, str]:
 
 def _subtitle(identified: Identified) -> str:
     rigs = ", ".join(dict.fromkeys(r.metadata.rig for r in (*identified.fit, *identified.held)))
-    fit, held = (
-        sum(float(r.time[-1] - r.time[0]) for r in p) for p in (identified.fit, identified.held)
-    )
-    about = (
-        f"{identified.start.robot.name} on {rigs}; {fit:.0f} s fitted, {held:.0f} s"
-        f" held out to judge ({identified.split}); search: {identified.plan.search}"
-    )
-    return f"{warning(identified)} {about}".strip()
+    fit, held = (sum(r.duration for r in part) for part in (identified.fit, identified.held))
+    return (
+        f"{warning(identified)} {identified.start.robot.name} on {rigs}; {fit:.0f} s fitted,"
+        f" {held:.0f} s held out to judge ({identified.split}); search: {identified.plan.search}"
+    ).strip()
 
 
 def _provenance(tree: dict[str, Any]) -> dict[str, str]:
+    """Return the facts of an identification's JSON that a person reads."""
     rows = {"seed": str(tree["seed"]), "split": tree["split"], **tree["versions"]}
-    search = dict(tree["search"])
-    passes, scales = search.pop("passes"), search.pop("scoring")
-    rows |= {k.replace("_", " "): str(v) for k, v in search.items()}
-    rows |= {f"scale of errors: {k}": f"{v:g}" for k, v in scales.items() if v is not None}
-    for one in passes:
+    for one in tree["search"]["passes"]:
         rows[one["name"]] = f"{one['candidates']} candidates, cost {one['cost']:.6g}"
     for r in tree["recordings"]:
         rows[f"{r['use']}: {r['name']}"] = f"{r['rows']} rows, sha256 {r['sha256'] or 'unknown'}"
@@ -163,10 +130,8 @@ def draw_overlay(overlay: Overlay) -> Figure:
     time = overlay.recording.time[rows]
     figure = Figure(figsize=(WIDTH, 4.4), layout="constrained")
     grid = figure.subplots(2, 2, sharex=True, squeeze=False)
-    for axes, (quantity, joint) in zip(grid.flat, _PANELS, strict=True):
-        axes.set_ylabel(
-            f"{JOINTS[joint]} {quantity} / {'rad' if quantity == 'position' else 'N m'}"
-        )
+    for axes, (quantity, joint) in zip(grid.flat, product(_PANELS, (0, 1)), strict=True):
+        axes.set_ylabel(f"{JOINTS[joint]} {quantity} / {_PANELS[quantity]}")
         measured = overlay.measured[quantity][rows, joint]
         before, after = overlay.simulated[quantity][:, rows, joint]
         known = ~np.isnan(measured)
@@ -225,11 +190,3 @@ def _interval(row: dict[str, Any]) -> str:
 def _untold(row: dict[str, Any]) -> bool:
     size = max(abs(row["value"]), row["scale"])
     return not row["interval_high"] - row["interval_low"] <= size
-
-
-def _looked_up(values: Mapping[str, float], row: dict[str, Any]) -> str:
-    return _number(values.get(row["name"], np.nan), 4)
-
-
-def _rms_text(quantity: str, index: int, factor: float, overlay: Overlay) -> str:
-    return ", ".join(_number(factor * value) for value in rms(overlay.errors(quantity)[index]))

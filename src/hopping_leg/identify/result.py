@@ -262,16 +262,15 @@ def _comment(identified: Identified, origin: str) -> str:
     for use, recordings in (("Fitted to", identified.fit), ("Judged by", identified.held)):
         lines += [f"{use}: {r.name}, sha256 {r.digest or 'unknown'}" for r in recordings]
     lines.append(f"Split: {identified.split}; seed {identified.seed}; {identified.plan.search}.")
-    versions = software_versions().items()
-    lines.append("Versions: " + ", ".join(f"{name} {value}" for name, value in versions) + ".")
+    libraries = software_versions().items()
+    lines.append("Versions: " + ", ".join(f"{name} {value}" for name, value in libraries) + ".")
     lines.append("Error on what judged (rms; hip, knee), before and after the fit:")
-    for row in quality_json(identified):
-        before, after = (
-            f"{row[f'hip_{when}']:.3g}, {row[f'knee_{when}']:.3g}" for when in ("before", "after")
-        )
-        lines.append(f"  {row['error']}: {before} and {after} {row['unit']}")
-    rows = parameters_json(identified)
-    drives = [row for row in rows if _place(row["name"]).startswith("drive.")]
+    lines += [
+        "  {error}: {hip_before:.3g}, {knee_before:.3g} and {hip_after:.3g}, {knee_after:.3g}"
+        " {unit}".format(**row)
+        for row in quality_json(identified)
+    ]
+    drives = [r for r in parameters_json(identified) if _place(r["name"]).startswith("drive.")]
     if drives:
         lines.append("Of the recordings' drives, which are no part of the robot:")
         lines += [f"  {r['name']} = {r['value']:.6g} {r['unit']} ({_source(r)})" for r in drives]
