@@ -88,7 +88,7 @@ def test_a_recording_that_the_model_cannot_explain_hardly_moves_the_estimate():
 
     def errors(scoring):
         goal = objective(parameters, scoring, [RUN, weak])
-        found = least_squares(goal.residuals, parameters, loss=goal.loss)
+        found = least_squares(goal.residuals, parameters, goal.loss)
         return np.abs(parameters.values(found.vector) / list(TRUTH.values()) - 1)
 
     assert errors(SCORING).max() > 0.5

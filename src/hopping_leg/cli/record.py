@@ -77,8 +77,6 @@ class MovingBase(Common):
     """How far the leg stays from straight, m; 0 is the paper's text, 0.005 the lab's recordings."""
     bend: paper.Bend = "backward"
     """Side of the knee; the lab's fixed-base recordings bend forward."""
-    every_pair: bool = False
-    """Combine every amplitude with every period instead of the first with the first and so on."""
     adapt: bool = True
     """Shrink amplitudes that the leg cannot follow instead of refusing them."""
 
@@ -173,7 +171,6 @@ def _template(args: MovingBase | MultisineCommand, robot: Robot, limits: Hardwar
         duration=args.duration,
         margin=args.margin,
         bend=args.bend,
-        every_pair=args.every_pair,
     )
     return paper.adapt(strokes, robot, rate=args.rate, limits=limits) if args.adapt else strokes
 

@@ -13,6 +13,9 @@ from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.simulate import Window, WindowSimulator
 from hopping_leg.robot.model import COARSE_TIMESTEP
 
+IN_FULL = 1e300
+"""A level that no residuals reach."""
+
 
 @dataclass(frozen=True)
 class RobustLoss:
@@ -29,7 +32,7 @@ class RobustLoss:
     groups: IntArray
     """Number of each residual's group, (size,)."""
     level: float
-    """Mean squared residual beyond which a group counts ever less."""
+    """Mean squared residual beyond which a group counts ever less; ``IN_FULL`` counts all alike."""
 
     @cached_property
     def sizes(self) -> IntArray:
@@ -48,22 +51,18 @@ class RobustLoss:
         share = (squares / (root + 1)) ** 2 * (2 * root + 1) / root**3
         return np.asarray(np.sqrt(self.sizes * self.level * share))
 
+    def levelled(self, residuals: Array) -> Array:
+        """Return weighted residuals and what is beside them, whose squares add up to the cost."""
+        return np.concatenate([self.weights(residuals) * residuals, self.rest(residuals)])
+
     def cost(self, residuals: Array) -> float:
         """Return the cost of one hypothesis's residuals, (size,)."""
-        weighted = self.weights(residuals) * residuals
-        return float(np.sum(weighted**2) + np.sum(self.rest(residuals) ** 2))
+        return float(np.sum(self.levelled(residuals) ** 2))
 
     def _squares(self, residuals: Array) -> Array:
         """Return groups' mean squared residuals in units of the level, (groups,)."""
         total = np.bincount(self.groups, np.square(residuals), len(self.sizes))
         return np.asarray(total / np.maximum(self.sizes, 1) / self.level)
-
-
-def total_costs(residuals: Array, loss: RobustLoss | None) -> Array:
-    """Return the costs (n,) of hypotheses' residuals (n, size); no loss counts all in full."""
-    if loss is None:
-        return np.asarray(np.square(residuals).sum(axis=1))
-    return np.array([loss.cost(r) for r in residuals])
 
 
 _QUANTITIES = ("position", "velocity", "torque", "height")
@@ -152,10 +151,9 @@ class Objective:
         return np.concatenate(parts)
 
     @cached_property
-    def loss(self) -> RobustLoss | None:
-        """What windows that no parameters explain are worth; None counts every one in full."""
-        level = self.scoring.unexplained
-        return None if level is None else RobustLoss(self.groups, level)
+    def loss(self) -> RobustLoss:
+        """What windows that no parameters explain are worth."""
+        return RobustLoss(self.groups, self.scoring.unexplained or IN_FULL)
 
     @property
     def jumping(self) -> IntArray | None:
@@ -181,7 +179,7 @@ class Objective:
 
     def __call__(self, vectors: Array) -> Array:
         """Return the costs of search vectors (n, k), by default the paper's J, (n,)."""
-        return total_costs(self.residuals(vectors), self.loss)
+        return np.array([self.loss.cost(r) for r in self.residuals(vectors)])
 
     def __getstate__(self) -> dict[str, Any]:
         cached = ("simulator", "_scored", "groups", "loss")

@@ -17,7 +17,7 @@ from scipy import optimize
 from hopping_leg import cma_strategy, workers
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.cost import Objective, RobustLoss, total_costs
+from hopping_leg.identify.cost import Objective, RobustLoss
 from hopping_leg.identify.parameters import ParameterSet, choose
 from hopping_leg.identify.plan import FitPlan, pass_names
 from hopping_leg.identify.simulate import Window
@@ -131,9 +131,9 @@ def jacobian(
 def least_squares(
     residuals: Evaluate,
     parameters: ParameterSet,
+    loss: RobustLoss,
     options: SearchOptions | None = None,
     *,
-    loss: RobustLoss | None = None,
     groups: IntArray | None = None,
     start: Array | None = None,
     report: Progress = lambda share, cost: None,
@@ -159,17 +159,14 @@ def least_squares(
         nonlocal tried, least, last
         tried += 1
         last = counted(vector[None])[0]
-        least = min(least, float(total_costs(last[None], loss)[0]))
+        levelled = loss.levelled(last)
+        least = min(least, float(np.sum(levelled**2)))
         report(min(tried / (options.rounds * options.evaluations), 1.0), least)
-        if loss is None:
-            return np.asarray(last)
-        return np.concatenate([loss.weights(last) * last, loss.rest(last)])
+        return levelled
 
     def slopes(vector: Array) -> Array:
         """Return the slopes of ``values``, which was called with the same vector just before."""
         found = jacobian(counted, vector, (low, high), groups)
-        if loss is None:
-            return found
         still = np.zeros((len(loss.sizes), len(vector)))
         return np.concatenate([loss.weights(last)[:, None] * found, still])
 
@@ -301,8 +298,8 @@ def _run_pass(
             least_squares,
             spread(objective.residuals),
             parameters,
+            objective.loss,
             options,
-            loss=objective.loss,
             groups=objective.jumping,
         )
     else:

@@ -113,36 +113,27 @@ def fixed_base(
     duration: float = DURATION,
     margin: float = 0.0,
     bend: Bend = "backward",
-    every_pair: bool = False,
     rig: recording_format.Rig = "fixed-base",
 ) -> Strokes:
     """Return the paper's fixed-base trajectory: the foot strokes while the leg swings.
 
-    See ``Stroke``; the duration of all strokes, s, is divided evenly. ``every_pair`` combines every
-    amplitude with every period; otherwise the first goes with the first and so on, as in the lab's
-    recordings.
+    The first amplitude goes with the first period and so on, as in the lab's recordings, each pair
+    with every swing; the duration of all, s, is divided evenly. See ``Stroke``.
     """
-    if not every_pair and len(amplitudes) != len(periods):
+    if len(amplitudes) != len(periods) or not amplitudes or not swings:
         raise UsageError(
             f"{len(amplitudes)} amplitudes and {len(periods)} periods do not pair; give as many of"
-            " one as of the other, or combine every pair."
+            " one as of the other, and at least one."
         )
-    pairs = (
-        itertools.product(amplitudes, periods)
-        if every_pair
-        else zip(amplitudes, periods, strict=True)
-    )
-    grid = list(itertools.product(pairs, swings))
-    if not grid:
-        raise UsageError("No stroke is left; give at least one amplitude, period and swing.")
-    count, length = len(grid), duration / len(grid)
+    grid = list(itertools.product(zip(amplitudes, periods, strict=True), swings))
+    length = duration / len(grid)
     parts = tuple(Stroke(a, t1, t2, length, margin, bend, rig) for (a, t1), t2 in grid)
     slowest = max(max(part.period, part.swing or 0.0) for part in parts)
-    if count > 1 and sum(part.duration for part in parts) < count * slowest - 1e-9:
+    if len(grid) > 1 and length < slowest - 1e-9:
         raise UsageError(
-            f"Each of {count} strokes lasts {length:.3g} s, so that one with a period of"
-            f" {slowest:g} s would break off; make them {count * slowest:g} s or longer in all, or"
-            " give fewer or shorter periods."
+            f"Each of {len(grid)} strokes lasts {length:.3g} s, so that one with a period of"
+            f" {slowest:g} s would break off; make them {len(grid) * slowest:g} s or longer in all,"
+            " or give fewer or shorter periods."
         )
     return Strokes(parts)
 
@@ -167,21 +158,25 @@ def adapt(
         UsageError: A stroke is beyond the leg at any amplitude.
     """
     limits = limits or excitation.HardwareRange()
-    return Strokes(tuple(_adapt_stroke(s, robot, rate, limits) for s in strokes.parts))
+    parts = []
+    for stroke in strokes.parts:
+        part = replace(stroke, margin=max(stroke.margin, LAB_MARGIN))
+        while not _fits(part, robot, rate, limits, last=part.amplitude * _SHRINK < _SMALLEST):
+            part = replace(part, amplitude=part.amplitude * _SHRINK)
+        parts.append(part)
+    return Strokes(tuple(parts))
 
 
-def _adapt_stroke(
-    stroke: Stroke, robot: Robot, rate: float, limits: excitation.HardwareRange
-) -> Stroke:
+def _fits(
+    stroke: Stroke, robot: Robot, rate: float, limits: excitation.HardwareRange, *, last: bool
+) -> bool:
+    """Return whether the leg can follow; the ``last`` amplitude raises UsageError if not."""
     time = np.arange(round(stroke.duration * rate)) / rate
-    stroke = replace(stroke, margin=max(stroke.margin, LAB_MARGIN))
-    while True:
-        try:
-            wanted = excitation.demand(robot, stroke.rig, stroke.joints(robot, time), rate)
-            excitation.check_demand(robot, wanted, rate, limits)
-        except UsageError:
-            stroke = replace(stroke, amplitude=stroke.amplitude * _SHRINK)
-            if stroke.amplitude < _SMALLEST:
-                raise
-        else:
-            return stroke
+    wanted = excitation.demand(robot, stroke.rig, stroke.joints(robot, time), rate)
+    try:
+        excitation.check_demand(robot, wanted, rate, limits)
+    except UsageError:
+        if last:
+            raise
+        return False
+    return True

@@ -252,8 +252,6 @@ def _conclude(objective: Objective, last: Pass) -> tuple[LegHypothesis, Identifi
     slopes = jacobian(objective.residuals, vector, bounds, objective.jumping)
     creeping = replace(last.parameters, base=last.parameters.base.replace({"drive.creep": _CREEP}))
     change = replace(objective, parameters=creeping).residuals(vector[None])[0] - residuals
-    if objective.loss is not None:
-        weights = objective.loss.weights(residuals)
-        residuals, slopes = weights * residuals, weights[:, None] * slopes
-        change = weights * change
-    return hypothesis, identifiability(last.parameters, vector, residuals, slopes, change)
+    weights = objective.loss.weights(residuals)
+    weighed = (weights * residuals, weights[:, None] * slopes, weights * change)
+    return hypothesis, identifiability(last.parameters, vector, *weighed)
