@@ -23,7 +23,7 @@ CEILINGS = {
     "src/**/*.py": (200, 31450),
     "tests/**/*.py": (147, 17000),
     "studies/**/*.py": (83, 8460),
-    "docs/**/*.md": (22, 2530),
+    "docs/**/*.md": (22, 2520),
     "docs/live/*.js": (13, 1490),
 }
 """Files and lines at most. Who raises one says what users gain by it."""
