@@ -9,9 +9,6 @@ from typing import Any
 LOWER = 0.34
 """Commands up to which less scatter is asked for, m."""
 
-LEAST_FLIGHT = 0.5
-"""Share of the time in flight at which energy shaping is compared."""
-
 
 @dataclass(frozen=True)
 class Accuracy:

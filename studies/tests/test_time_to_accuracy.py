@@ -114,29 +114,24 @@ def tiny(monkeypatch, tmp_path):
     return make
 
 
-def test_a_distillation_is_trained_anew_for_every_share_of_its_steps_and_once(tiny, tmp_path):
+def test_a_distillation_is_trained_anew_for_every_share_once_and_goes_on_if_killed(tiny, tmp_path):
     steps = TINY_FAST.schedule.steps
-    found = tiny("fast")
-    assert tiny.trained == [(TINY_FAST.name, 0, steps // 2), (TINY_FAST.name, 0, steps)]
-    assert [row["steps"] for row in found["rows"]] == [steps // 2, steps]
-    assert {row["part"] for row in found["spent"]} >= {"rollouts", "gradient steps"}
-    assert found["robots"] == {"fast": ROBOT.name}
-    assert (tmp_path / "curves.svg").stat().st_size > 1000
-    assert tiny("fast") == found
-    assert len(tiny.trained) == 2
-
-
-def test_a_study_that_was_killed_goes_on(tiny):
     tiny.killed_after = 1
     with pytest.raises(KeyboardInterrupt):
         tiny("fast")
     tiny.killed_after = None
-    rows = tiny("fast", seeds=(0, 1))["rows"]
-    steps = TINY_FAST.schedule.steps
+    found = tiny("fast", seeds=(0, 1))
     assert [(seed, count) for _, seed, count in tiny.trained] == [
         (0, steps // 2), (0, steps), (1, steps // 2), (1, steps),
     ]  # fmt: skip
-    assert [row["seed"] for row in rows] == [0, 0, 1, 1]
+    assert [(row["seed"], row["steps"]) for row in found["rows"]] == [
+        (seed, count) for _, seed, count in tiny.trained
+    ]
+    assert {row["part"] for row in found["spent"]} >= {"rollouts", "gradient steps"}
+    assert found["robots"] == {"fast": ROBOT.name}
+    assert (tmp_path / "curves.svg").stat().st_size > 1000
+    assert tiny("fast", seeds=(0, 1)) == found
+    assert len(tiny.trained) == 4
 
 
 def test_of_a_recipe_without_shares_every_snapshot_is_judged(tiny):
