@@ -83,14 +83,6 @@ def test_the_gallery_from_stored_traces_is_the_reports(judged, tmp_path):
     assert to_svg(after[0].figure) == to_svg(before[0].figure)
 
 
-def test_a_trace_from_elsewhere_can_be_drawn(fixed, tmp_path):
-    path = tmp_path / "robot.parquet"
-    Trace(fixed.table).save(path)
-    run = load_run(path)
-    assert (run.controller, run.trial.kind) == ("robot", "fixed")
-    assert run.trial.seconds == pytest.approx(15.0)
-
-
 def test_an_estimators_bias_is_measured(fixed):
     found = metrics.judge_estimator("spring", [with_estimate(fixed, 0.01)])
     assert found.flight_bias_m == pytest.approx(0.01)

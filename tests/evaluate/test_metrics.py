@@ -103,20 +103,13 @@ def test_policies_of_one_recipe_are_pooled(rows):
     assert group.worst_abs_error_m == 0.004
     assert (group.skipped_hops, group.body_contacts) == (3, 6)
     assert ERRORS[0] <= group.median_error_low_m <= group.median_error_high_m <= ERRORS[-1]
+    silent = dataclasses.replace(rows[0], median_error_m=-0.05, std_m=np.nan, hops=0)
+    (group,) = pool_group("fast", [silent, *rows[1:]], 0)
+    assert (group.policies, group.motionless, group.worst_abs_error_m) == (3, 1, 0.05)
+    assert group.median_error_low_m == -0.05, "a policy that never hops stays, as a miss"
     other = [dataclasses.replace(row, command_m=0.35, median_error_m=0.02) for row in rows]
     groups = pool_group("fast", rows + other, 0)
     assert [(g.command_m, g.median_error_m) for g in groups] == [(0.25, 0.001), (0.35, 0.02)]
-
-
-def test_a_policy_that_never_hops_stays_as_a_miss(rows):
-    silent = dataclasses.replace(rows[0], median_error_m=-0.05, std_m=np.nan, hops=0)
-    (group,) = pool_group("fast", [silent, *rows[1:]], 0)
-    assert (group.policies, group.motionless) == (3, 1)
-    assert group.median_error_m == pytest.approx(0.001)
-    assert group.worst_abs_error_m == 0.05
-    assert group.median_error_low_m == -0.05
-    (nothing,) = pool_group("fast", [silent], 0)
-    assert (nothing.median_error_m, nothing.worst_abs_error_m) == (-0.05, 0.05)
 
 
 def test_a_run_without_hops_stays_in_median_distance_and_interval():

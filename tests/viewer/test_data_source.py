@@ -3,7 +3,7 @@ import polars as pl
 import pytest
 
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder, FlightRecorderTail
+from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder
 from hopping_leg.deploy.loop import columns
 from hopping_leg.errors import RobotError, TraceError, UsageError
 from hopping_leg.robot import kinematics, load_robot
@@ -33,25 +33,6 @@ def finished(path, count, **header):
     writer = box(path, **header)
     write(writer, 0, count)
     writer.close()
-
-
-def test_a_tail_returns_each_row_once_wherever_the_file_was_cut(tmp_path):
-    source = box(tmp_path / f"whole{SUFFIX}")
-    write(source, 0, 50)
-    source.event(what="a transition")
-    write(source, 50, 50)
-    source.close()
-    content = source.path.read_bytes()
-    growing = tmp_path / f"growing{SUFFIX}"
-    growing.touch()
-    tail, seen = FlightRecorderTail(growing), []
-    with growing.open("ab", buffering=0) as file:
-        for start in range(0, len(content), 37):
-            file.write(content[start : start + 37])
-            seen += [row[0] for row in tail.rows() if len(row)]
-    np.testing.assert_allclose(seen, np.arange(100) / 200)
-    assert tail.columns == COLUMNS
-    assert tail.header["controller"] == "fast"
 
 
 def test_a_run_is_shown_as_it_grows_until_it_is_over(tmp_path):

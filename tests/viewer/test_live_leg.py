@@ -78,18 +78,6 @@ def test_a_push_moves_the_base_and_ends():
     assert pushed._legs[0]._force == 0.0
 
 
-def test_a_controller_takes_over_in_the_present_state():
-    live = quiet("energy-shaping")
-    live.advance(0.5)
-    before = heights(live)[-1]
-    live.set_controllers(("fast",))
-    live.tick()
-    assert live.tracks[0].name == "fast"
-    assert abs(heights(live)[-1] - before) < 0.02
-    live.advance(2.0)
-    assert len(last_apexes(live)) >= 2
-
-
 def test_a_second_leg_hops_beside_the_first_and_settings_change_the_motion():
     live = quiet("energy-shaping")
     live.set_controllers(("energy-shaping", "energy-shaping"))

@@ -18,35 +18,31 @@ from websockets.http11 import Request, Response
 _OWN = ("localhost", "127.0.0.1", "::1")
 
 
-def refusal(request: Request) -> str:
-    """Return why a request is refused, or nothing."""
-    host = request.headers.get("Host", "")
-    origin = request.headers.get("Origin", "")
-    try:
-        if urlsplit(f"//{host}").hostname not in _OWN:
-            return "This page is served to this computer alone."
-        if (origin or "Upgrade" in request.headers) and urlsplit(origin).netloc != host:
-            return "Another page may not use this one."
-    except ValueError:
-        return "This request is none of a browser."
-    return ""
-
-
 def answer(
     serve_page: Callable[[Any, Request], Response | None],
     connection: Any,  # noqa: ANN401
     request: Request,
 ) -> Response | None:
     """Return the answer to a request, None where the websocket may be opened."""
-    why = refusal(request).encode()
-    if why:
-        length = Headers({"Content-Type": "text/plain", "Content-Length": str(len(why))})
-        response: Response | None = Response(http.HTTPStatus.FORBIDDEN, "Forbidden", length, why)
-    else:
+    if _is_own(request):
         response = serve_page(connection, request)
+    else:
+        said = b"This page is served to this computer alone, and to no other page."
+        length = Headers({"Content-Type": "text/plain", "Content-Length": str(len(said))})
+        response = Response(http.HTTPStatus.FORBIDDEN, "Forbidden", length, said)
     if response is not None:
         response.headers["X-Frame-Options"] = "DENY"
     return response
+
+
+def _is_own(request: Request) -> bool:
+    """Tell whether this computer's browser asks, for a page of our own."""
+    host, origin = (request.headers.get(name, "") for name in ("Host", "Origin"))
+    try:
+        same = urlsplit(origin).netloc == host or not (origin or "Upgrade" in request.headers)
+        return same and urlsplit(f"//{host}").hostname in _OWN
+    except ValueError:  # none of a browser's
+        return False
 
 
 @contextlib.contextmanager

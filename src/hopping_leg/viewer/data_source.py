@@ -129,10 +129,8 @@ class RecorderSource:
         if self._wait <= 0:
             self._wait = _LOOK
             self._look()
-        if self._tail is None:
-            return
-        rows = self._tail.rows()
-        if not len(rows):
+        rows = self._tail.rows() if self._tail else ()
+        if self._tail is None or not len(rows):
             return
         if not self.tracks:
             header = self._tail.header
@@ -140,7 +138,7 @@ class RecorderSource:
             robot = _load_shipped(name, f"{self._tail.path} is of")
             depth = round(KEPT_SECONDS * CONTROL_RATE)
             self.tracks = [Track(str(header.get("controller", "")), robot, depth=depth)]
-        table = pl.DataFrame(dict(zip(self._tail.columns, rows.T, strict=True)))
+        table = pl.DataFrame(rows, schema=list(self._tail.columns), orient="row")
         self.tracks[0].extend_by_trace(trace.Trace(table))
         self.now = float(self.tracks[0].time[-1])
 
@@ -149,17 +147,12 @@ class RecorderSource:
         if self._tail is not None and self._tail.over and not self._over:
             self._over = True
             self.notices.append("The run is over; its trace is on disk.")
-        newest = self._newest()
-        if newest is None or (self._tail is not None and newest == self._tail.path):
+        boxes = [self._path]
+        if self._path.is_dir():  # of those written in one tick of the file system, the last by name
+            boxes = sorted(self._path.glob(f"*{SUFFIX}"), key=lambda b: (b.stat().st_mtime_ns, b))
+        if not boxes or (self._tail is not None and boxes[-1] == self._tail.path):
             return
         if self._tail is not None:
             self._tail.close()
-        self._tail, self._over, self.tracks, self.now = FlightRecorderTail(newest), False, [], 0.0
-        self.notices.append(f"Following {newest.name}.")
-
-    def _newest(self) -> Path | None:
-        """Return the box written last; of several in one tick of the file system, by name."""
-        if not self._path.is_dir():
-            return self._path if self._path.exists() else None
-        boxes = [(box.stat().st_mtime_ns, box) for box in self._path.glob(f"*{SUFFIX}")]
-        return max(boxes)[1] if boxes else None
+        self._tail, self._over, self.tracks, self.now = FlightRecorderTail(boxes[-1]), False, [], 0
+        self.notices.append(f"Following {boxes[-1].name}.")

@@ -46,11 +46,6 @@ class LiveSettings:
     noise: bool = True
     """The paper's noise and random delay of measurements."""
 
-    @property
-    def noise_and_delay(self) -> NoiseAndDelay:
-        """Noise and delay of measurements and torques."""
-        return NoiseAndDelay() if self.noise else NO_NOISE
-
     def apply(self, robot: Robot) -> Robot:
         """Return the robot with these settings."""
         latency, ground = robot.reality.latency, robot.reality.ground
@@ -95,6 +90,9 @@ class LiveSimulation:
     Raises:
         UsageError: There is no such controller, or they share no height.
         RobotError: There is no such robot, or it cannot hop.
+
+    Attributes:
+        valid: Heights that every controller can be asked for, m.
     """
 
     def __init__(
@@ -117,11 +115,6 @@ class LiveSimulation:
         self._compiling = start_compiling() if at_once else None
         self._in_mujoco = False
         self._begin(controllers, self.robot)
-
-    @property
-    def valid(self) -> command_schedule.Range:
-        """Heights that every controller can be asked for, m."""
-        return _shared_range(self._controllers, self.robot)
 
     def advance(self, seconds: float) -> None:
         """Let simulated time pass, in whole ticks."""
@@ -172,24 +165,12 @@ class LiveSimulation:
             leg.stand(self.height)
 
     def set_controllers(self, names: tuple[str, ...]) -> None:
-        """Go on with other controllers in the present state; another number of legs begins anew.
+        """Begin anew with other controllers.
 
         Raises:
             UsageError: As for the constructor; everything stays as it was.
         """
-        if len(names) != len(self.names):
-            self._begin(names, self.robot)
-            return
-        loaded = _load(names, self.robot)
-        _shared_range(loaded, self.robot)
-        changed = [i for i, name in enumerate(names) if name != self.names[i]]
-        self.names = names
-        for i in changed:
-            self._controllers[i] = loaded[i]
-        self.set_height(self.height)
-        for i in changed:
-            self.tracks[i].name = loaded[i].name
-            self._legs[i].set_controller(loaded[i], self.height)
+        self._begin(names, self.robot)
 
     def set_robot(self, robot: str) -> None:
         """Begin anew with another robot and its own settings.
@@ -201,13 +182,13 @@ class LiveSimulation:
 
     def _begin(self, names: tuple[str, ...], robot: Robot) -> None:
         robot.require_leg()
-        loaded = _load(names, robot)
-        _shared_range(loaded, robot)
+        if not 1 <= len(names) <= MOST:
+            raise UsageError(f"{len(names)} controllers were given; give one, or two side by side.")
+        loaded = [registry.load_controller(name, robot) for name in names]
+        self.valid = _shared_range(loaded, robot)
         if robot != self.robot:
             self.settings = default_settings(robot)
-        self.robot = robot
-        self.names = names
-        self._controllers: list[protocol.Controller] = loaded
+        self.robot, self.names = robot, names
         self.set_height(self.height)
         changed = self.settings.apply(robot)
         self._in_mujoco = self._compiling is not None and changed.reality.neutral
@@ -218,15 +199,10 @@ class LiveSimulation:
         self.tracks = [Track(c.name, robot, depth=depth) for c in loaded]
 
     def _go_on(self) -> None:
-        changed, noise_and_delay = self.settings.apply(self.robot), self.settings.noise_and_delay
+        changed = self.settings.apply(self.robot)
+        noise_and_delay = NoiseAndDelay() if self.settings.noise else NO_NOISE
         for leg in self._legs:
             leg.go_on(changed, noise_and_delay, self.height, in_mujoco=self._in_mujoco)
-
-
-def _load(names: tuple[str, ...], robot: Robot) -> list[protocol.Controller]:
-    if not 1 <= len(names) <= MOST:
-        raise UsageError(f"{len(names)} controllers were given; give one, or two side by side.")
-    return [registry.load_controller(name, robot) for name in names]
 
 
 def _shared_range(controllers: list[protocol.Controller], robot: Robot) -> command_schedule.Range:
@@ -259,12 +235,7 @@ class LiveLeg:
         self._legs.stand(_ALL, RolloutConfig(self._legs.robot).start_posture)
         self._legs.push(np.zeros(1))
         self._force = 0.0
-        self.set_controller(self.controller, height)
-
-    def set_controller(self, controller: protocol.Controller, height: float) -> None:
-        """Go on with another controller, or the same one anew, in the present state."""
-        self.controller = controller
-        controller.reset(1)
+        self.controller.reset(1)
         self._restart(height)
 
     def go_on(
