@@ -37,7 +37,8 @@ def measured(monkeypatch, *names):
 def test_every_case_is_another():
     found = cases(load_robot(DEFAULT_ROBOT))
     told = {
-        (repr(c.controller.gains), c.controller.options, c.controller.period, c.robot.digest,
+        (repr(c.controller.gains), c.controller.options, type(c.controller),
+         c.controller.period, c.robot.digest,
          c.disturbance, tuple(c.commands))
         for c in found
     }  # fmt: skip

@@ -5,13 +5,10 @@ import pytest
 
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.energy_shaping import (
-    EnergyShaping,
     equations,
-    paper_energy_shaping,
     tuned_energy_shaping,
 )
-from hopping_leg.controllers.energy_shaping.virtual_leg import Phase, retraction
-from hopping_leg.errors import UsageError
+from hopping_leg.controllers.energy_shaping.virtual_leg import Phase
 from hopping_leg.evaluate.metrics import measure
 from hopping_leg.robot import GRAVITY, load_robot
 from hopping_leg.sim import NO_NOISE
@@ -75,28 +72,6 @@ def test_gain_rises_on_a_heavier_leg():
     assert abs(medians[1] - medians[0]) < 0.01
 
 
-def test_literal_law_meets_the_command_when_it_knows_contact_and_height():
-    run = hop(paper_energy_shaping(ROBOT, true_contact=True), QUIET)
-    for leg in range(len(COMMANDS)):
-        assert abs(np.median(measure(run.trace(leg))[0].error)) < 0.003
-
-
-@pytest.mark.slow
-def test_literal_law_with_its_own_estimate_is_worse_than_the_tuned_one(tuned):
-    literal = hop(paper_energy_shaping(ROBOT), RolloutConfig(ROBOT, threads=1), seconds=6.0)
-
-    def spread(rollout):
-        return np.mean([np.std(measure(rollout.trace(i))[0].apex) for i in range(3)])
-
-    assert spread(literal) > 1.5 * spread(tuned)
-
-
-def test_options_that_need_the_truth_say_so(monkeypatch):
-    monkeypatch.setattr(EnergyShaping, "watch", lambda self, legs: None)
-    with pytest.raises(UsageError, match="simulation only"):
-        hop(paper_energy_shaping(ROBOT, true_contact=True), QUIET)
-
-
 @pytest.mark.parametrize(
     ("robot", "command", "rate"),
     [
@@ -132,11 +107,3 @@ def test_gain_rests_at_the_desired_height_and_moves_towards_it_by_bounded_steps(
     gain = equations.updated_gain(np.ones(3), np.full(3, 0.3), absurd, exponent)
     least, most = np.array(equations.STEP) ** exponent
     assert ((least <= gain) & (gain <= most)).all()
-
-
-def test_retraction_starts_and_ends_at_rest_at_its_ends():
-    start, end = np.array([[0.3, -0.8]]), np.array([[0.8, -1.5]])
-    for elapsed, where in ((0.0, start), (0.1, end), (0.4, end)):
-        q, qd = retraction(start, end, np.array([elapsed]), 0.1)
-        np.testing.assert_allclose(q, where)
-        np.testing.assert_allclose(qd, 0, atol=1e-12)

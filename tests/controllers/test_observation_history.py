@@ -45,16 +45,6 @@ def test_every_known_sample_stands_at_its_tick(seed):
         np.testing.assert_array_equal(track.qd[..., 1][track.known], -10 * expected[track.known])
 
 
-def test_what_has_not_arrived_holds_the_sample_before():
-    for _, track in tracks(60):
-        track.hold(10)
-        for leg in range(4):
-            known = np.flatnonzero(track.known[:, leg])
-            for back in range(10):
-                newest_before = known[known >= back][0]
-                assert track.q[back, leg, 0] == track.q[newest_before, leg, 0]
-
-
 @pytest.fixture
 def layout():
     layout = Dated(PERIOD)
@@ -124,12 +114,6 @@ def swing(time, count):
     q = np.stack([0.7 + 0.3 * np.sin(phase), -1.4 + 0.6 * np.sin(phase)], axis=-1)
     rate = 2 * np.pi * 1.5 * np.cos(phase)
     return q, np.stack([0.3 * rate, 0.6 * rate], axis=-1)
-
-
-def test_undisturbed_state_passes_through():
-    q, qd, _ = errors(NoiseAndDelay(0.0, 0.0, 0.0), gain=0.1)
-    assert np.abs(q).max() < 1e-3
-    assert np.abs(qd).max() < 1e-12
 
 
 def test_late_samples_do_not_make_the_state_late():

@@ -166,13 +166,6 @@ def test_a_forgotten_leg_acts_as_from_a_fresh_start_and_others_go_on(
         np.testing.assert_array_equal(as_told[~forgotten], as_untold[~forgotten])
 
 
-def test_a_leg_that_is_not_there_cannot_be_forgotten():
-    policy = loaded(network(), 3)
-    for rows in (np.array([3]), np.array([True, False])):
-        with pytest.raises(UsageError, match="controls 3 legs"):
-            policy.reset(rows)
-
-
 @pytest.mark.parametrize("command", [0.1, 0.5, np.nan])
 @pytest.mark.parametrize("count", [1, 3])
 def test_command_out_of_range_is_refused(command, count):

@@ -7,8 +7,8 @@ import pytest
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.command_schedule import CommandSchedule, check_schedule, command_range
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.errors import PhysicsError, RobotError, UsageError
-from hopping_leg.robot import build_model, command_limits, load_robot
+from hopping_leg.errors import PhysicsError, UsageError
+from hopping_leg.robot import command_limits, load_robot
 from hopping_leg.sim import NO_NOISE
 
 ROBOT = load_robot("legv2")
@@ -74,11 +74,6 @@ def test_an_unstable_simulation_is_an_error():
     robot = dataclasses.replace(with_shank(mass=1e-6, inertia=1e-12), knee=knee)
     with pytest.raises(PhysicsError, match="unstable"):
         rollout(Constant([5, -20]), RolloutConfig(robot, threads=1), np.full((100, 2), 0.3), seed=0)
-
-
-def test_parameters_that_mujoco_refuses_are_a_robot_error():
-    with pytest.raises(RobotError, match="legv2"):
-        build_model(with_shank(mass=1e-18))
 
 
 LEG = load_robot("legv2-paper")

@@ -12,13 +12,12 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import vector as wrappers
 
 from hopping_leg import ENV_ID
-from hopping_leg.envs import ApexRewardConfig, HoppingTask, TaskConfig, apex_reward, paper_reward
+from hopping_leg.envs import ApexRewardConfig, TaskConfig, apex_reward
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import DEFAULT_ROBOT, load_robot
 from hopping_leg.sim import NO_NOISE
 from hopping_leg.sim.randomization import WIDE_RANGES
 
-SHORT = TaskConfig(episode=0.1)
 RANDOM = TaskConfig(
     episode=0.1,
     observation="dated",
@@ -100,17 +99,6 @@ def test_a_leg_knows_nothing_of_its_neighbour(kind):
         np.testing.assert_array_equal(seen[0], other_seen[0])
         assert reward[0] == other_reward[0]
     assert (seen[1] != other_seen[1]).any()
-
-
-@pytest.mark.parametrize("kind", [SINGLE, VECTOR])
-def test_spaces_are_each_environments_own(kind):
-    samples = []
-    for neighbour in (1, 2):
-        one, other = make(kind), make(kind)
-        one.action_space.seed(1)
-        other.action_space.seed(neighbour)
-        samples.append(one.action_space.sample().tobytes())
-    assert samples[0] == samples[1]
 
 
 def overwrite(seen):
@@ -270,23 +258,6 @@ def test_gymnasiums_vector_wrappers_fit(wrap):
 @pytest.mark.filterwarnings("error")
 def test_the_environment_passes_gymnasiums_checker():
     check_env(gymnasium.make(ENV_ID).unwrapped, skip_render_check=True)
-
-
-def test_vector_env_is_the_batched_task():
-    mode = AutoresetMode.SAME_STEP
-    vector = gymnasium.make_vec(ENV_ID, 5, options=SHORT, threads=1, autoreset_mode=mode)
-    observation, _ = vector.reset(seed=11)
-    robot = load_robot(DEFAULT_ROBOT)
-    rng, _ = gymnasium.utils.seeding.np_random(11)
-    task = HoppingTask(robot, 5, SHORT, paper_reward(robot), np.random.default_rng(0), 1)
-    np.testing.assert_array_equal(observation, task.reseed(rng))
-    plan = np.random.default_rng(1).uniform(-1, 1, (45, 5, 2)).astype(np.float32)
-    for tick, action in enumerate(plan, 1):
-        observation, reward, _, truncated, _ = vector.step(action)
-        step = task.step(action)
-        np.testing.assert_array_equal(observation, step.observation)
-        np.testing.assert_array_equal(reward, step.reward)
-        assert truncated.all() == (tick % 20 == 0)
 
 
 @pytest.mark.parametrize(

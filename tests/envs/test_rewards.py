@@ -144,8 +144,3 @@ def test_the_height_barrier_as_printed_rewards_overshoot_and_the_step_does_not(b
     below, above = (terms_of(config, height=height) for height in (0.29, 0.40))
     assert below[1]["height"] == 0.0
     assert (above[0] > below[0]) == (barrier == "printed")
-
-
-def test_velocity_limit_can_be_chosen():
-    config = PaperRewardConfig(velocity_limit=10.0)
-    assert terms_of(config, qd=(11.0, -12.0))[1]["velocity"] == pytest.approx(21.0 + 44.0)

@@ -80,12 +80,6 @@ def test_episodes_end_on_time_and_the_last_observation_is_kept():
             assert step.final_observation is None
 
 
-def test_staggered_legs_do_not_end_together():
-    spread = task(TaskConfig(episode=0.5, random_episode_start=True), count=50)
-    ends = [spread.step(np.zeros((50, 2))).truncated.sum() for _ in range(100)]
-    assert sum(ends) == 50 > 5 * max(ends)
-
-
 def test_commands_come_from_the_paper_or_a_range_and_switch_on_time():
     paper = task(TaskConfig(), count=200)
     assert set(paper.command) == {0.25, 0.30, 0.35}

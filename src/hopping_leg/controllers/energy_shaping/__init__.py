@@ -4,7 +4,6 @@ from hopping_leg.controllers.energy_shaping.controller import EnergyShaping
 from hopping_leg.controllers.energy_shaping.gains import (
     LITERAL,
     ROBUST,
-    TRUE_CONTACT,
     TUNED,
     ShapingGains,
     load_gains,
@@ -27,15 +26,7 @@ def tuned_energy_shaping(
     return EnergyShaping(robot, scaled, ROBUST, rate=rate, name=gains)
 
 
-def paper_energy_shaping(
-    robot: Robot, *, rate: float = CONTROL_RATE, true_contact: bool = False
-) -> EnergyShaping:
-    """Return the paper's law and gains with nothing added.
-
-    With ``true_contact``, contact, base velocity and height come from the simulator, so that the
-    law is judged apart from what feeds it.
-    """
-    origin = load_robot(load_gains().robot)
-    gains = scale_gains(ShapingGains(), origin, robot)
-    options = TRUE_CONTACT if true_contact else LITERAL
-    return EnergyShaping(robot, gains, options, rate=rate, name="energy-shaping-literal")
+def paper_energy_shaping(robot: Robot, *, rate: float = CONTROL_RATE) -> EnergyShaping:
+    """Return the paper's law and gains with nothing added."""
+    gains = scale_gains(ShapingGains(), load_robot(load_gains().robot), robot)
+    return EnergyShaping(robot, gains, LITERAL, rate=rate, name="energy-shaping-literal")

@@ -9,20 +9,12 @@ from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.controllers.energy_shaping import equations, virtual_leg
 from hopping_leg.controllers.energy_shaping.gains import Gain, ShapingGains, ShapingOptions
 from hopping_leg.controllers.sample_history import DatedObserver
-from hopping_leg.errors import UsageError
 from hopping_leg.robot import Robot, kinematics
-from hopping_leg.sim import CONTROL_RATE, Measurement, Simulator
-
-_BLIND_TICKS = 4  # ticks after a change of phase in which true contact still flickers
+from hopping_leg.sim import CONTROL_RATE, Measurement
 
 
 class EnergyShaping:
-    """The baseline controller, at a control rate in Hz.
-
-    Attributes:
-        truth: What ``watch`` was shown, where an option reads ``"true"``; None for a controller
-            that measures nothing but its joints.
-    """
+    """The baseline controller, at a control rate in Hz; it measures nothing but its joints."""
 
     def __init__(
         self,
@@ -36,15 +28,9 @@ class EnergyShaping:
         self.robot, self.name, self.period = robot, name, 1 / rate
         self.gains = gains or ShapingGains()
         self.options = options or ShapingOptions()
-        self.truth: Simulator | None = None
         thigh, shank = robot.thigh.length, robot.shank.length
         bent = 2 * thigh * shank * np.cos(robot.knee.upper)
         self._longest = float(np.sqrt(thigh**2 + shank**2 + bent))
-
-    def watch(self, legs: Simulator) -> None:
-        """Take the true state where an option reads ``"true"``, else ignore it."""
-        if "true" in (self.options.contact, self.options.height):
-            self.truth = legs
 
     def reset(self, count: int) -> None:
         """Forget everything; the legs stand and push next."""
@@ -60,7 +46,6 @@ class EnergyShaping:
         self._rate = np.zeros(count)
         self._liftoff_height, self._liftoff_rate = np.zeros(count), np.zeros(count)
         self._liftoff_q = np.zeros((count, 2))
-        self._highest = np.zeros(count)
         self._height = np.zeros(count)
         self._apex = np.full((3, count), np.nan)
 
@@ -132,31 +117,24 @@ class EnergyShaping:
 
     def _end_push(self, leg: virtual_leg.LegView, liftoff: Array) -> None:
         clock, rate, since = self._phases.clock, leg.rate, np.zeros_like(leg.rate)
-        match self.options.liftoff:
-            case "true":
-                done = (self._true().foot_clearance() > 0) & (clock > _BLIND_TICKS * self.period)
-            case "length":
-                done = leg.length >= liftoff
-            case "timed":
-                done, rate, since = self._share < 1, self._rate, (1 - self._share) * self.period
+        if self.options.liftoff == "timed":
+            done, rate, since = self._share < 1, self._rate, (1 - self._share) * self.period
+        else:
+            done = self._stretched(leg, liftoff)
         who = self._phases.are(virtual_leg.Phase.LIFTOFF) & (
             done | (clock > virtual_leg.PUSH_LIMIT)
         )
         self._liftoff_height = np.where(who, leg.stand, self._liftoff_height)
         self._liftoff_rate = np.where(who, rate, self._liftoff_rate)
         self._liftoff_q = np.where(who[:, None], leg.q, self._liftoff_q)
-        self._highest = np.where(who, 0.0, self._highest)
         self._phases.enter(who, virtual_leg.Phase.FLIGHT, since)
 
     def _end_flight(
         self, leg: virtual_leg.LegView, posture_rate: Array, flying: Array, command: Array
     ) -> None:
         gains, clock = self.gains, self._phases.clock
-        pushed = self._detector.update(leg, posture_rate, flying, gains)
         shortest = gains.flight_min + gains.flight_min_slope * (command - gains.reference)
-        touched = pushed & (clock > shortest)
-        if self.options.contact == "true":
-            touched = (self._true().foot_clearance() <= 0) & (clock > _BLIND_TICKS * self.period)
+        touched = self._touched(leg, posture_rate, flying, shortest)
         who = self._phases.are(virtual_leg.Phase.FLIGHT) & (
             touched | (clock > virtual_leg.FLIGHT_LIMIT)
         )
@@ -172,7 +150,7 @@ class EnergyShaping:
         airborne = np.maximum(airborne, self.period)
         ballistic = equations.ballistic_apex(self._liftoff_height, self._liftoff_rate)
         timed = equations.flight_time_apex(self._liftoff_height, leg.stand, airborne)
-        raw = {"ballistic": ballistic, "flight_time": timed, "true": self._highest}[options.height]
+        raw = self._reached(ballistic, timed)
         lean = raw - gains.reference
         apex = gains.reference + gains.height_offset + gains.height_scale * lean
         self._apex = np.where(who, np.stack([apex, ballistic, timed]), self._apex)
@@ -182,8 +160,7 @@ class EnergyShaping:
 
     def _end_touchdown(self, leg: virtual_leg.LegView, command: Array) -> None:
         clock = self._phases.clock
-        rate = self._true().height_rate if self.options.contact == "true" else leg.rate
-        turned = (rate >= 0) & (clock > 2 * self.period)
+        turned = (self._braked_rate(leg) >= 0) & (clock > 2 * self.period)
         who = self._phases.are(virtual_leg.Phase.TOUCHDOWN) & (
             turned | (clock > virtual_leg.BRAKE_LIMIT)
         )
@@ -196,12 +173,21 @@ class EnergyShaping:
             self._liftoff_height, self._liftoff_rate, self._phases.clock
         )
         self._height = np.where(self._phases.are(virtual_leg.Phase.FLIGHT), flying, leg.stand)
-        if self.truth is not None:
-            self._highest = np.maximum(self._highest, self.truth.height)
 
-    def _true(self) -> Simulator:
-        if self.truth is None:
-            raise UsageError(
-                "Options that read 'true' exist in simulation only, where `watch` shows the legs."
-            )
-        return self.truth
+    # What a study asks the simulator instead.
+
+    def _stretched(self, leg: virtual_leg.LegView, liftoff: Array) -> BoolArray:
+        stretched: BoolArray = leg.length >= liftoff
+        return stretched
+
+    def _touched(
+        self, leg: virtual_leg.LegView, planned: Array, torque: Array, shortest: Array
+    ) -> BoolArray:
+        pushed = self._detector.update(leg, planned, torque, self.gains)
+        return pushed & (self._phases.clock > shortest)
+
+    def _braked_rate(self, leg: virtual_leg.LegView) -> Array:
+        return leg.rate
+
+    def _reached(self, ballistic: Array, timed: Array) -> Array:
+        return timed if self.options.height == "flight_time" else ballistic

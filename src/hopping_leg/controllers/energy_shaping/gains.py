@@ -88,20 +88,18 @@ class ShapingOptions:
 
     state: Literal["latest", "dated"] = "latest"
     """Joint state: the newest sample, or a filter over the dated history of samples."""
-    contact: Literal["rate", "debounced", "true"] = "rate"
-    """Touchdown: one leg rate, the median of three, or the simulator's truth."""
-    liftoff: Literal["length", "timed", "true"] = "length"
-    """End of the push: at a leg length, there even within a control period, or when contact is
-    truly lost."""
-    height: Literal["ballistic", "flight_time", "true"] = "ballistic"
-    """Apex: from the lift-off speed, from the time in the air, or the simulator's truth."""
+    contact: Literal["rate", "debounced"] = "rate"
+    """Touchdown: one leg rate, or the median of three."""
+    liftoff: Literal["length", "timed"] = "length"
+    """End of the push: at a leg length, or there even within a control period."""
+    height: Literal["ballistic", "flight_time"] = "ballistic"
+    """Apex: from the lift-off speed, or from the time in the air."""
     desired: Literal["present", "pushed"] = "present"
     """E_d of the update: of the present command, or of the one in force at the push it judges."""
 
 
 LITERAL = ShapingOptions()
-TRUE_CONTACT = ShapingOptions(contact="true", height="true")
-"""The paper's description, and the same with perfect knowledge of contact and height."""
+"""The paper's description."""
 
 ROBUST = ShapingOptions("dated", "debounced", "timed", "flight_time", "pushed")
 """The readings of the tuned controller."""
