@@ -13,7 +13,6 @@ Both together give the closed form's mass matrix, in the air and against the gro
 
 import dataclasses
 import tempfile
-import weakref
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as Xml
@@ -47,95 +46,73 @@ class PyBulletWorld:
     """
 
     def __init__(self, robot: Robot, timestep: float) -> None:
-        self._bullet = bullet = import_pybullet()
-        self._id = bullet.connect(bullet.DIRECT)
-        self._world = {"physicsClientId": self._id}
-        if self._id < 0:
-            raise UsageError("PyBullet has no world left for another leg; simulate fewer at once.")
-        bullet.setGravity(0, 0, -GRAVITY, **self._world)
+        self._bullet = bullet = open_bullet()
+        bullet.setGravity(0, 0, -GRAVITY)
         solver = {"numSolverIterations": _ITERATIONS, "solverResidualThreshold": 0}
-        bullet.setPhysicsEngineParameter(fixedTimeStep=timestep, **solver, **self._world)
-        self._leg = self._load(pybullet_urdf(robot))
-        self._joints = self._find_joints()
-        self._make_free(robot)
-        self._add_ground(robot)
-
-    def _load(self, urdf: str) -> int:
+        bullet.setPhysicsEngineParameter(fixedTimeStep=timestep, **solver)
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "leg.urdf"
-            path.write_text(urdf, encoding="utf-8")
-            flags = self._bullet.URDF_USE_INERTIA_FROM_FILE
-            leg: int = self._bullet.loadURDF(
-                str(path), useFixedBase=True, flags=flags, **self._world
-            )
-        return leg
-
-    def _find_joints(self) -> dict[str, int]:
-        joints = range(self._bullet.getNumJoints(self._leg, **self._world))
-        infos = (self._bullet.getJointInfo(self._leg, joint, **self._world) for joint in joints)
-        return {info[1].decode(): info[0] for info in infos}
+            path.write_text(pybullet_urdf(robot), encoding="utf-8")
+            flags = bullet.URDF_USE_INERTIA_FROM_FILE
+            self._leg = leg = bullet.loadURDF(str(path), useFixedBase=True, flags=flags)
+        infos = (bullet.getJointInfo(leg, joint) for joint in range(bullet.getNumJoints(leg)))
+        self._joints = joints = {info[1].decode(): info[0] for info in infos}
+        self._coordinates = [joints[name] for name in ("rail", "hip", "knee")]
+        self._motors = [joints["hip"], joints["knee"]]
+        self._make_free(robot)
+        ground = bullet.createMultiBody(0, bullet.createCollisionShape(bullet.GEOM_PLANE))
+        bullet.changeDynamics(ground, -1, lateralFriction=robot.contact.friction)
 
     def _make_free(self, robot: Robot) -> None:
-        bullet, leg, joints, world = self._bullet, self._leg, self._joints, self._world
+        bullet, leg, joints = self._bullet, self._leg, self._joints
         free = {"linearDamping": 0, "angularDamping": 0, "maxJointVelocity": _NO_LIMIT}
         friction = {name: getattr(robot, name).friction for name in ("rail", "hip", "knee")}
         hold = bullet.VELOCITY_CONTROL
         for name, joint in joints.items():
             force = friction.get(name, 0.0)
-            bullet.changeDynamics(leg, joint, **free, lateralFriction=1, **world)
-            bullet.setJointMotorControl2(leg, joint, hold, targetVelocity=0, force=force, **world)
-        knee, rotor, gear = joints["knee"], joints[ROTOR], bullet.JOINT_GEAR
-        here = [0, 0, 0]
-        gear = bullet.createConstraint(leg, knee, leg, rotor, gear, [0, -1, 0], here, here, **world)
-        bullet.changeConstraint(gear, gearRatio=-1, maxForce=_NO_LIMIT, **world)
-        self._coordinates = [joints[name] for name in ("rail", "hip", "knee")]
-        self._motors = [joints["hip"], joints["knee"]]
-
-    def _add_ground(self, robot: Robot) -> None:
-        bullet = self._bullet
-        shape = bullet.createCollisionShape(bullet.GEOM_PLANE, **self._world)
-        ground = bullet.createMultiBody(0, shape, **self._world)
-        bullet.changeDynamics(ground, -1, lateralFriction=robot.contact.friction, **self._world)
+            bullet.changeDynamics(leg, joint, **free, lateralFriction=1)
+            bullet.setJointMotorControl2(leg, joint, hold, targetVelocity=0, force=force)
+        knee, rotor, here = joints["knee"], joints[ROTOR], [0, 0, 0]
+        gear = bullet.createConstraint(
+            leg, knee, leg, rotor, bullet.JOINT_GEAR, [0, -1, 0], here, here
+        )
+        bullet.changeConstraint(gear, gearRatio=-1, maxForce=_NO_LIMIT)
 
     def put(self, state: Array) -> None:
         """Give the leg a state (x, q1, q2 and their rates), (6,)."""
         places = [*self._coordinates, self._joints[ROTOR]]
         for joint, source in zip(places, (0, 1, 2, 2), strict=True):
-            self._bullet.resetJointState(
-                self._leg, joint, float(state[source]), float(state[source + 3]), **self._world
-            )
+            angle, rate = float(state[source]), float(state[source + 3])
+            self._bullet.resetJointState(self._leg, joint, angle, rate)
 
-    def step(self, torque: Array, substeps: int) -> Array:
-        """Hold joint torques, N m, (2,), for some steps; return the state then, (6,)."""
-        bullet, forces = self._bullet, torque.tolist()
-        for _ in range(substeps):
-            bullet.setJointMotorControlArray(
-                self._leg, self._motors, bullet.TORQUE_CONTROL, forces=forces, **self._world
-            )
-            bullet.stepSimulation(**self._world)
-        joints = bullet.getJointStates(self._leg, self._coordinates, **self._world)
+    def step(self, torque: Array) -> Array:
+        """Hold joint torques, N m, (2,), for a step; return the state then, (6,)."""
+        bullet, motors = self._bullet, self._motors
+        bullet.setJointMotorControlArray(
+            self._leg, motors, bullet.TORQUE_CONTROL, forces=torque.tolist()
+        )
+        bullet.stepSimulation()
+        joints = bullet.getJointStates(self._leg, self._coordinates)
         return np.array([joint[0] for joint in joints] + [joint[1] for joint in joints])
 
-    def close(self) -> None:
-        """Free the world; PyBullet has room for about a thousand."""
-        if self._id >= 0:
-            self._bullet.disconnect(self._id)
-            self._id = -1
 
-
-def import_pybullet() -> Any:  # noqa: ANN401
-    """Import PyBullet where it is asked for.
+def open_bullet() -> Any:  # noqa: ANN401
+    """Return a world of PyBullet's own, freed with what holds it; it has room for about a thousand.
 
     Raises:
-        UsageError: It is not installed.
+        UsageError: PyBullet is not installed, or has no world left.
     """
     try:
         import pybullet
+        from pybullet_utils.bullet_client import BulletClient
     except ModuleNotFoundError as error:
         raise UsageError(
             "This study needs PyBullet; install it with `pip install pybullet`."
         ) from error
-    return pybullet
+    client = BulletClient(pybullet.DIRECT)
+    if client._client < 0:
+        raise UsageError("PyBullet has no world left for another leg; simulate fewer at once.")
+    return client
 
 
 def pybullet_urdf(robot: Robot) -> str:
@@ -202,7 +179,6 @@ class PyBulletSimulator(Simulator):
                 " without, e.g. legv2-paper."
             )
         self._worlds = [PyBulletWorld(robot, timestep) for _ in range(count)]
-        self._finalizer = weakref.finalize(self, _close, self._worlds)
         self._show(np.zeros((count, 6)))
         self._known = np.full((count, 6), np.nan)
         self._motors = MotorLimit(robot)
@@ -228,12 +204,7 @@ class PyBulletSimulator(Simulator):
         for _ in range(self.substeps):
             self._applied = self._motors.give(torque, self.qd)
             for leg, world in enumerate(self._worlds):
-                self.state[leg] = world.step(self._applied[leg], 1)
+                self.state[leg] = world.step(self._applied[leg])
             total += self._applied
         self._known[:] = self.state
         return total / self.substeps
-
-
-def _close(worlds: list[PyBulletWorld]) -> None:
-    for world in worlds:
-        world.close()
