@@ -7,7 +7,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate import metrics, motor_load, statistics, trials
-from hopping_leg.evaluate.result import Comparison, Evaluation, Group, Staircase, Summary
+from hopping_leg.evaluate.result import Evaluation, Group, Staircase, Summary
 from hopping_leg.robot import Robot
 
 
@@ -47,7 +47,10 @@ def tabulate(
         sequence=rows("sequence"),
         ladder=rows("ladder"),
         staircase=[_staircase(name, found) for name, found in stairs.items() if found],
-        neighbours=[Comparison(name, _compare(measured[name], seed)) for name in controllers],
+        neighbours=[
+            {"controller": name, "neighbours": _compare(measured[name], seed)}
+            for name in controllers
+        ],
         distributions=[
             {
                 "controller": name,
@@ -164,25 +167,25 @@ def _spread(apexes: list[Array]) -> float:
 
 def pool_group(group: str, rows: Sequence[Summary], seed: int) -> list[Group]:
     """Aggregate the summary rows of several policies of one recipe, one row per command."""
-    return [
-        _group_row(group, command, [row for row in rows if row.command_m == command], seed)
-        for command in sorted({row.command_m for row in rows})
-    ]
-
-
-def _group_row(group: str, command: float, rows: Sequence[Summary], seed: int) -> Group:
-    errors = np.array([row.median_error_m for row in rows])
-    low, high = statistics.median_interval(list(errors[:, None]), seed)
-    return Group(
-        group=group,
-        command_m=command,
-        policies=len(rows),
-        motionless=sum(not row.hops for row in rows),
-        median_error_m=float(np.median(errors)),
-        median_error_low_m=low,
-        median_error_high_m=high,
-        worst_abs_error_m=float(np.abs(errors).max()),
-        median_std_m=statistics.of(np.median, np.array([row.std_m for row in rows if row.hops])),
-        skipped_hops=sum(row.skipped_hops for row in rows),
-        body_contacts=sum(row.body_contacts for row in rows),
-    )
+    found = []
+    for command in sorted({row.command_m for row in rows}):
+        own = [row for row in rows if row.command_m == command]
+        errors = np.array([row.median_error_m for row in own])
+        low, high = statistics.median_interval(list(errors[:, None]), seed)
+        stds = np.array([row.std_m for row in own if row.hops])
+        found.append(
+            Group(
+                group=group,
+                command_m=command,
+                policies=len(own),
+                motionless=sum(not row.hops for row in own),
+                median_error_m=float(np.median(errors)),
+                median_error_low_m=low,
+                median_error_high_m=high,
+                worst_abs_error_m=float(np.abs(errors).max()),
+                median_std_m=statistics.of(np.median, stds),
+                skipped_hops=sum(row.skipped_hops for row in own),
+                body_contacts=sum(row.body_contacts for row in own),
+            )
+        )
+    return found

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from hopping_leg.evaluate.motor_load import MotorLoad
-from hopping_leg.evaluate.statistics import Neighbours
 from hopping_leg.io import plain, write_json
 
 SCHEMA = 2
@@ -80,14 +79,6 @@ class Staircase:
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """Neighbouring commands of one controller."""
-
-    controller: str
-    neighbours: list[Neighbours]
-
-
-@dataclass(frozen=True)
 class Estimator:
     """Estimated minus true height of a controller that estimates it, all runs pooled."""
 
@@ -134,7 +125,8 @@ class Evaluation:
     """The sequence alone."""
     ladder: list[Summary]
     staircase: list[Staircase]
-    neighbours: list[Comparison]
+    neighbours: list[dict[str, Any]]
+    """Neighbouring commands compared: controller, neighbours."""
     distributions: list[dict[str, Any]]
     """Apexes behind ``summary``: controller, command_m, apexes_m."""
     estimators: list[Estimator] = field(default_factory=list)

@@ -160,24 +160,16 @@ def evaluation_tables(evaluation: Row) -> dict[str, Markup]:
 
 
 def _staircase_table(stairs: Sequence[Row]) -> Markup:
-    """Return medians per step and what follows from them, a table per set of steps."""
+    """Return medians per step and what follows from them; all climb the same steps."""
 
     def step(number: int, command: float) -> Column:
         return Column(f"{command:.2f} m", lambda row: millimetres(row["median_apexes_m"][number]))
 
-    last = (
-        Column("monotone", lambda r: "yes" if r["monotone"] else "no", lambda r: not r["monotone"]),
-        Column("runs monotone", lambda r: f"{r['monotone_runs']} of {r['runs']}"),
-        _SKIPPED,
-    )
-    return Markup("").join(
-        table(
-            (_CONTROLLER, *itertools.starmap(step, enumerate(steps)), *last),
-            list(rows),
-            "median apex at each step / mm",
-        )
-        for steps, rows in itertools.groupby(stairs, lambda row: row["commands_m"])
-    )
+    steps = itertools.starmap(step, enumerate(stairs[0]["commands_m"] if stairs else ()))
+    runs = Column("runs monotone", lambda r: f"{r['monotone_runs']} of {r['runs']}")
+    monotone = Column("monotone", lambda r: "yes" if r["monotone"] else "no")
+    columns = (_CONTROLLER, *steps, monotone, runs, _SKIPPED)
+    return table(columns, stairs, "median apex at each step / mm")
 
 
 def verdict(evaluation: Evaluation, controller: str) -> str:
