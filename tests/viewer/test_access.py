@@ -16,10 +16,9 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request
 
 from hopping_leg.errors import UsageError
-from hopping_leg.viewer.access import answer
 from hopping_leg.viewer.live_leg import LiveSimulation
 from hopping_leg.viewer.panels import GuiQueue, LivePanel, chosen, within
-from hopping_leg.viewer.viewer import Viewer
+from hopping_leg.viewer.viewer import Viewer, answer
 
 OWN = ("127.0.0.1:8080", "localhost:9000", "[::1]:1", "localhost")
 FOREIGN = ("elsewhere.example", "127.0.0.1.elsewhere.example:8080", "192.168.0.7:8080", "", "[")

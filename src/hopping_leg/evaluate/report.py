@@ -44,7 +44,10 @@ class Picture:
 
 _OVER_TIME = {
     "staircase": ("Staircase", "while the command rises every 5 s, as in the paper's Fig. 5"),
-    "sequence": ("All commands in turn", "for 5 s each, as in the paper's Fig. 8"),
+    "sequence": (
+        "All commands in turn",
+        "while the command changes every 5 s, as in the paper's Fig. 8",
+    ),
     "heights": ("Heights over time", "over time"),
 }
 

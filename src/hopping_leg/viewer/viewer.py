@@ -1,21 +1,35 @@
-"""The page and the loop behind it: what is asked, what passes, what is shown."""
+"""The page and the loop behind it: who may ask, what is asked, what passes, what is shown.
+
+viser serves whoever connects, and any page that this computer's browser shows could. So every
+request, that for the websocket too, is first asked whether it comes from this computer's browser
+and the page's own address: nothing else steers the leg.
+"""
 
 import contextlib
+import functools
 import html
+import http
 import io
 import math
 import time
+from collections.abc import Callable, Iterator
 from importlib import resources
+from typing import Any
+from unittest.mock import patch
+from urllib.parse import urlsplit
 
 import viser
 from viser import _messages
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
 
 from hopping_leg.colours import COLOURS, rgb
 from hopping_leg.errors import UsageError
 from hopping_leg.sim import CONTROL_RATE
-from hopping_leg.viewer import access, charts, data_source, live_leg, panels, scene
+from hopping_leg.viewer import charts, data_source, live_leg, panels, scene
 
 _HOST = "127.0.0.1"
+_OWN = ("localhost", "127.0.0.1", "::1")
 FRAME_RATE = 60.0
 _SLOW = 6
 """Pictures per update of each plot and of the text; they take turns."""
@@ -146,5 +160,49 @@ def _send(client: viser.ClientHandle, message: _messages.Message) -> None:
 def _serve(port: int) -> viser.ViserServer:
     if not 0 <= port < 65536:
         raise UsageError(f"--port is {port} but must lie between 0 and 65535.")
-    with contextlib.redirect_stdout(io.StringIO()), access.guarded():
+    with contextlib.redirect_stdout(io.StringIO()), _guarded():
         return viser.ViserServer(host=_HOST, port=port, verbose=False)
+
+
+def answer(
+    serve_page: Callable[[Any, Request], Response | None],
+    connection: Any,  # noqa: ANN401
+    request: Request,
+) -> Response | None:
+    """Return the answer to a request, None where the websocket may be opened."""
+    if _is_own(request):
+        response = serve_page(connection, request)
+    else:
+        said = b"This page is served to this computer alone, and to no other page."
+        length = Headers({"Content-Type": "text/plain", "Content-Length": str(len(said))})
+        response = Response(http.HTTPStatus.FORBIDDEN, "Forbidden", length, said)
+    if response is not None:
+        response.headers["X-Frame-Options"] = "DENY"
+    return response
+
+
+def _is_own(request: Request) -> bool:
+    """Tell whether this computer's browser asks, for a page of our own."""
+    host, origin = (request.headers.get(name, "") for name in ("Host", "Origin"))
+    try:
+        same = urlsplit(origin).netloc == host or not (origin or "Upgrade" in request.headers)
+        return same and urlsplit(f"//{host}").hostname in _OWN
+    except ValueError:  # none of a browser's
+        return False
+
+
+@contextlib.contextmanager
+def _guarded() -> Iterator[None]:
+    """Let every server of websockets that is made meanwhile ask here; there must be one."""
+    from websockets.asyncio import server
+
+    serve, made = server.serve, list[bool]()
+
+    def asking(*args: Any, process_request: Any, **options: Any) -> Any:  # noqa: ANN401
+        made.append(True)
+        process = functools.partial(answer, process_request)
+        return serve(*args, process_request=process, **options)
+
+    with patch.object(server, "serve", asking):
+        yield
+    assert made, "this version of viser would serve everyone"
