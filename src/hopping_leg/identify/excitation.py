@@ -83,45 +83,27 @@ def demand(robot: Robot, rig: Rig, position: Array, rate: float) -> Demand:
 
 def check_demand(robot: Robot, wanted: Demand, rate: float, limits: HardwareRange) -> None:
     """Raise UsageError for what range, ground or torque-speed lines forbid, by joint and time."""
-    lower, upper = np.array([limits.hip, limits.knee]).T
-    fastest = robot.of_joints("no_load_speed")
-    possible = MotorLimit(robot).clip(wanted.torque, wanted.velocity)
-    outside = (wanted.position < lower) | (wanted.position > upper)
-    facts = {
-        "angle": wanted.position,
-        "speed": wanted.velocity,
-        "torque": wanted.torque,
-        "possible": possible,
-        "lower": lower,
-        "upper": upper,
-        "fastest": fastest,
-        "part": np.array(["base", "knee"]),
-        "clearance": wanted.clearance * 1e3,
-        "least": LEAST_CLEARANCE * 1e3,
-    }
-    for bad, reason in (
-        (np.isnan(wanted.position), "the foot is out of reach"),
+    q, speed, torque, clearance = vars(wanted).values()
+    low, high = np.array([limits.hip, limits.knee]).T
+    fastest, possible = robot.of_joints("no_load_speed"), MotorLimit(robot).clip(torque, speed)
+    outside, low_down = (q < low) | (q > high), clearance < LEAST_CLEARANCE
+    for bad, reason, *values in (
+        (np.isnan(q), "the foot is out of reach"),
+        (outside, "{:.2f} rad is outside of the hardware's range {:g} to {:g} rad", q, low, high),
+        (low_down, "base or knee is {:.1f} mm above the ground, too low", 1e3 * clearance),
+        (np.abs(speed) > fastest, "{:.1f} rad/s exceeds {:g} rad/s", speed, fastest),
         (
-            outside,
-            "{angle:.2f} rad is outside of the hardware's range {lower:g} to {upper:g} rad",
-        ),
-        (
-            wanted.clearance < LEAST_CLEARANCE,
-            "the {part} is {clearance:.0f} mm above the ground, below {least:g} mm",
-        ),
-        (np.abs(wanted.velocity) > fastest, "{speed:.1f} rad/s exceeds {fastest:g} rad/s"),
-        (
-            np.abs(wanted.torque - possible) > 1e-9,
-            "{torque:.1f} N m at {speed:.1f} rad/s exceeds the {possible:.1f} N m that the motor"
-            " gives",
+            np.abs(torque - possible) > 1e-9,
+            "{:.1f} N m at {:.1f} rad/s exceeds the {:.1f} N m that the motor gives",
+            *(torque, speed, possible),
         ),
     ):
         if bad.any():
             tick, joint = np.argwhere(bad)[0].tolist()
-            at = {k: np.broadcast_to(v, bad.shape)[tick, joint] for k, v in facts.items()}
+            facts = [np.broadcast_to(value, bad.shape)[tick, joint] for value in values]
             raise UsageError(
                 f"The leg cannot follow the trajectory: at {tick / rate:.3f} s, {JOINTS[joint]}:"
-                f" {reason.format(**at)}; lower the amplitude, slow it down or adapt it."
+                f" {reason.format(*facts)}; lower the amplitude, slow it down or adapt it."
             )
 
 
@@ -199,7 +181,6 @@ class Multisine:
 RATE = 200.0
 """Rate of the paper's recordings, Hz."""
 _KEY = "excitation"
-_WORDS = ("rig", "robot", "description")
 _FACTS = {"rig": "rig", "rate_hz": "rate", "robot": "robot", "description": "description"}
 
 
@@ -241,11 +222,12 @@ class Excitation:
 def load_excitation(path: Path) -> Excitation:
     """Load an excitation, or raise TraceError if the file is missing, foreign or none."""
     trace = Trace.load(path)
-    found = trace.header.get(_KEY)
-    facts = found if isinstance(found, dict) else {}
-    known = all(isinstance(facts.get(name), str) for name in _WORDS)
-    if not known or not is_number(rate := facts.get("rate_hz", 0)) or not rate > 0:
+    facts = trace.header.get(_KEY)
+    if not isinstance(facts, dict) or not facts.keys() >= _FACTS.keys():
         raise TraceError(f"{path} is no excitation; write one with `hop record`.")
+    rate = facts["rate_hz"]
+    if not is_number(rate) or not rate > 0 or not all(map(str, facts.values())):
+        raise TraceError(f"{path} has a rate of {rate} Hz; write it again with `hop record`.")
     pairs = (PAIRS[f"{quantity}_command"] for quantity in ("position", "velocity"))
     position, velocity = (np.column_stack([trace.column(c) for c in pair]) for pair in pairs)
     return Excitation(trace.column("time_s"), position, velocity, *(facts[n] for n in _FACTS))

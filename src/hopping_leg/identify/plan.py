@@ -48,11 +48,6 @@ def check_recordings(recordings: Sequence[Recording], robot: Robot) -> None:
             own = load_robot(recording.metadata.robot)
         except RobotError:
             continue  # filed under a robot that is not here: nothing to compare with
-        if own.kind != robot.kind:
-            raise RecordingError(
-                f"{recording.name} is of '{recording.metadata.robot}', a {own.kind}, but"
-                f" '{robot.name}' is a {robot.kind}; give its robot file with --robot."
-            )
         for link in ("thigh", "shank"):
             measured, given = (getattr(r, link).length for r in (own, robot))
             if abs(given / measured - 1) > _TOLERANCE:
@@ -189,9 +184,8 @@ def _limits(recordings: Sequence[Recording]) -> list[str]:
     beyond = np.zeros(2, dtype=bool)
     for recording in recordings:
         metadata, torque = recording.metadata, recording.array("torque")
-        if metadata.onboard != "continuous" or None in (metadata.stiffness, metadata.damping):
-            continue
-        if not np.isfinite(torque).any(axis=0).all():
+        unknown = None in (metadata.stiffness, metadata.damping)
+        if metadata.onboard != "continuous" or unknown or np.isnan(torque).all(axis=0).any():
             continue
         q, qd = initial_states.full_states(recording)
         spring = np.array(metadata.stiffness) * (recording.array("position_command") - q)

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.identify import initial_states, parameters, recording_format
+from hopping_leg.identify import initial_states, parameters
 from hopping_leg.identify.cost import measured
 from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.recording_format import PAIRS, Pair
 from hopping_leg.identify.simulate import Window, WindowSimulator, cut
 from hopping_leg.robot.model import COARSE_TIMESTEP
 
@@ -21,12 +22,12 @@ _UNSCORED = 1.0  # beginning that does not count in closed loop, s, or a quarter
 class Validation:
     """Root mean square errors, (hip, knee), on exact samples only; NaN where nothing counts."""
 
-    closed_loop_position: recording_format.Pair
+    closed_loop_position: Pair
     """Under the recording's own controller from its first row on, rad; recordings that command
     torques have none and do not count."""
-    closed_loop_torque: recording_format.Pair
+    closed_loop_torque: Pair
     """Likewise, N m."""
-    open_loop_position: dict[float, recording_format.Pair]
+    open_loop_position: dict[float, Pair]
     """By horizon in s: driven by the recorded torques alone, rad."""
 
 
@@ -54,19 +55,18 @@ def open_loop(
     horizon: float,
     timestep: float = COARSE_TIMESTEP,
     threads: int = 0,
-) -> recording_format.Pair:
+) -> Pair:
     """Return the rms position error of predictions restarted every half horizon, rad.
 
     The motors get the measured torque, or the commanded one where the rig drives torques itself.
     A recording that is shorter than the horizon, s, is left out.
     """
     driven = [
-        as_torque_driven(r)
-        for r in recordings
-        if max(s.stop - s.start for s in r.segments())
-        >= max(3, round(horizon * r.metadata.rate_hz))
+        d
+        for d in map(as_torque_driven, recordings)
+        if max(s.stop - s.start for s in d.segments()) >= max(3, horizon * d.metadata.rate_hz)
+        and d.has("torque_command")
     ]
-    driven = [d for d in driven if d.has("torque_command")]
     windows = [w for w in cut(driven, horizon, stride=horizon / 2) if _starts_known(driven, w)]
     return _errors(driven, windows, hypothesis, timestep, threads, "position")[0]
 
@@ -78,7 +78,7 @@ def _errors(
     timestep: float,
     threads: int,
     *quantities: str,
-) -> list[recording_format.Pair]:
+) -> list[Pair]:
     if not windows:
         return [(np.nan, np.nan)] * len(quantities)
     simulator = WindowSimulator(recordings, windows, timestep=timestep, threads=threads)
@@ -94,11 +94,9 @@ def as_torque_driven(recording: Recording) -> Recording:
     """
     if recording.metadata.onboard == "torque":
         return recording
-    table = recording.trace.table
     share = 1.0 if recording.metadata.onboard == "zoh" else 0.5
-    for command, torque in zip(
-        recording_format.PAIRS["torque_command"], recording_format.PAIRS["torque"], strict=True
-    ):
+    table = recording.trace.table
+    for command, torque in zip(PAIRS["torque_command"], PAIRS["torque"], strict=True):
         if torque in table.columns:
             now = table[torque].interpolate().fill_null(strategy="backward")
             later = now.shift(-1).fill_null(strategy="forward")
@@ -116,7 +114,7 @@ def _starts_known(recordings: Sequence[Recording], window: Window) -> bool:
     return bool(np.isfinite(state).all()) or recording.has("position_estimate")
 
 
-def rms(errors: Array) -> recording_format.Pair:
+def rms(errors: Array) -> Pair:
     """Return the root mean square over everything but the joint, the last axis, ignoring NaN."""
     flat = errors.reshape(-1, 2)
     counts = np.count_nonzero(~np.isnan(flat), axis=0)
@@ -164,19 +162,14 @@ def overlays(
         length, unscored = (RESTART, 0.0) if restarted else (None, skip)
         windows = cut([recording], length, unscored=unscored)
         simulator = WindowSimulator([recording], windows, timestep=timestep, threads=threads)
-        found, known, simulated = simulator.run(hypotheses), {}, {}
+        simulated = simulator.run(hypotheses)
+        known, found = {}, {}
         for name in ("position", "torque"):
-            values = measured(simulator, name)[None]
-            known[name] = _in_rows(values, windows, len(recording))[0]
-            simulated[name] = _in_rows(getattr(found, name), windows, len(recording))
-        drawn.append(Overlay(recording, restarted, known, simulated))
+            values = np.concatenate([measured(simulator, name)[None], getattr(simulated, name)])
+            rows = np.full((len(values), len(recording), 2), np.nan)
+            for w, window in enumerate(windows):  # where they lie in the recording
+                stop = window.start + window.length
+                rows[:, window.start : stop] = values[:, w, : window.length]
+            known[name], found[name] = rows[0], rows[1:]
+        drawn.append(Overlay(recording, restarted, known, found))
     return drawn
-
-
-def _in_rows(values: Array, windows: Sequence[Window], rows: int) -> Array:
-    """Put windows (n, windows, length, 2) where they lie in their recording, (n, rows, 2)."""
-    placed = np.full((len(values), rows, 2), np.nan)
-    for index, window in enumerate(windows):
-        stop = window.start + window.length
-        placed[:, window.start : stop] = values[:, index, : window.length]
-    return placed
