@@ -103,7 +103,8 @@ def hops(engine, robot, ticks=400):
     def drop(legs):
         legs.stand(slice(None), POSTURE, 0.01)
 
-    return rollout(controller, config, commands, 0, on_legs=drop, legs=legs).data["height_m"]
+    controller.watch = drop
+    return rollout(controller, config, commands, 0, legs=legs).data["height_m"]
 
 
 @pytest.mark.parametrize("engine", ["stepper", "mujoco"])

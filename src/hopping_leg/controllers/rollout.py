@@ -74,7 +74,10 @@ class RolloutConfig:
 
 @runtime_checkable
 class PrivilegedController(Protocol):
-    """A controller that looks at the simulated legs themselves: for studies, never for a robot."""
+    """A controller that looks at the simulated legs themselves, and may place them elsewhere.
+
+    It is for studies, never for a robot.
+    """
 
     def watch(self, legs: Simulator) -> None:
         """Take the legs, live; called before their first tick."""
@@ -104,7 +107,6 @@ def rollout(
     commands: Array,
     seed: int,
     on_tick: Callable[[int, int], None] | None = None,
-    on_legs: Callable[[Simulator], None] | None = None,
     perturbation: Perturbation | None = None,
     legs: Simulator | None = None,
 ) -> Rollout:
@@ -116,7 +118,6 @@ def rollout(
         commands: Desired height for every tick and leg, m, (ticks, n).
         seed: Seed of noise and delay.
         on_tick: Called with (ticks done, ticks in all), for progress bars.
-        on_legs: Called once with the legs, which it may place where they shall start instead.
         perturbation: Changes of the legs that ``config`` does not know; recorded heights are above
             the ground of the moment, recorded commands are the controller's.
         legs: What hops instead of what ``config`` describes.
@@ -128,26 +129,19 @@ def rollout(
         PhysicsError: The simulation became unstable.
     """
     ticks, count = commands.shape
-    if perturbation is None:
-        perturber = None
-        legs = legs or LegSimulator(
+    perturber = None
+    if legs is None:
+        legs = made = LegSimulator(
             config.robot, count, rate=config.rate, timestep=config.timestep,
-            threads=config.threads,
+            threads=config.threads, robots=() if perturbation is None else perturbation.robots,
         )  # fmt: skip
-    else:
-        legs = LegSimulator(
-            config.robot, len(perturbation.robots), rate=config.rate, timestep=config.timestep,
-            threads=config.threads, robots=perturbation.robots,
-        )  # fmt: skip
-        perturber = Perturber(perturbation, legs)
+        perturber = None if perturbation is None else Perturber(perturbation, made)
     plant = Plant(legs, config.disturbance, config.soft_limits, np.random.default_rng(seed))
     legs.stand(slice(None), config.start_posture)
     plant.channel.restart(slice(None), legs.q, legs.qd, commands[0])
     controller.reset(count)
     if isinstance(controller, PrivilegedController):
         controller.watch(legs)
-    if on_legs is not None:
-        on_legs(legs)
     data = np.empty((len(_COLUMNS), ticks, count))
     internals: dict[str, Array] = {}
     for tick in range(ticks):
