@@ -37,9 +37,6 @@ from studies.shared import Row, host, show_numbers
 HEIGHTS = (0.25, 0.30, 0.35)
 """Commands that are compared, m."""
 
-MOST_STOPS = 5
-"""Stops by the supervisor after which the benchmark gives up."""
-
 _TIMES = ("wake_late", "exchange", "control", "tick")
 """Parts of a tick whose times the trace has."""
 
@@ -78,26 +75,20 @@ class Deploy:
         return result
 
     def _real_time(self, robot: Robot) -> Row:
-        """Hop in real time until the minutes are over; start again after a stop."""
-        wanted, done = 60 * self.minutes, 0.0
-        traces: list[Trace] = []
-        stops: list[str] = []
-        notices: tuple[str, ...] = ()
-        while done < wanted - 1 and len(stops) < MOST_STOPS:
-            say(f"{(wanted - done) / 60:.1f} minutes in real time ...")
-            part = (wanted - done) / len(HEIGHTS)
-            schedule = CommandSchedule(tuple((height, part) for height in HEIGHTS))
-            with EmulatorProcess(EmulatorConfig(robot=self.robot)) as emulator:
-                link = MoteusLink(robot, open_transport(str(emulator.path)))
-                performance = self._perform(link, robot, schedule)
-                link.close()
-            notices = performance.notices
-            traces.append(_hopping(performance.trace))
-            done += traces[-1].table.height / CONTROL_RATE
-            cause = performance.outcome.supervisor.stop_cause
-            if cause.reason.name != "FINISHED":
-                stops.append(str(cause))
-        return {"minutes": done / 60, "stops": stops, "notices": list(notices), **_ticks(traces)}
+        """Hop in real time until the minutes are over, or the supervisor stops the leg."""
+        say(f"{self.minutes:g} minutes in real time ...")
+        part = 60 * self.minutes / len(HEIGHTS)
+        schedule = CommandSchedule(tuple((height, part) for height in HEIGHTS))
+        with EmulatorProcess(EmulatorConfig(robot=self.robot)) as emulator:
+            link = MoteusLink(robot, open_transport(str(emulator.path)))
+            performance = self._perform(link, robot, schedule)
+            link.close()
+        cause = performance.outcome.supervisor.stop_cause
+        return {
+            "stops": [] if cause.reason.name == "FINISHED" else [str(cause)],
+            "notices": list(performance.notices),
+            **_ticks(_hopping(performance.trace)),
+        }
 
     def _height(self, robot: Robot, height: float) -> Row:
         """Compare the median apex through the wire with that in process."""
@@ -170,20 +161,17 @@ def _hopping(trace: Trace) -> Trace:
     return Trace(trace.table.filter(trace.table["part"] == Part.HOP), trace.header)
 
 
-def _ticks(traces: list[Trace]) -> Row:
+def _ticks(trace: Trace) -> Row:
     """Return percentiles, and the share of all ticks due that were done within their period."""
-
-    def pooled(column: str) -> Array:
-        return np.concatenate([trace.column(column) for trace in traces])
-
-    took, skipped = pooled("tick_s"), int(pooled("skipped_ticks").sum())
-    fresh = np.minimum(pooled("hip_fresh"), pooled("knee_fresh"))
+    took, skipped = trace.column("tick_s"), int(trace.column("skipped_ticks").sum())
+    fresh = np.minimum(trace.column("hip_fresh"), trace.column("knee_fresh"))
     return {
+        "minutes": len(took) / CONTROL_RATE / 60,
         "ticks": len(took),
         "skipped": skipped,
         "share_on_time": float((took <= 1 / CONTROL_RATE).sum() / (len(took) + skipped)),
         "ticks_without_all_replies": int((fresh == 0).sum()),
-        **{f"{name}_us": _percentiles(pooled(f"{name}_s")) for name in _TIMES},
+        **{f"{name}_us": _percentiles(trace.column(f"{name}_s")) for name in _TIMES},
     }
 
 
