@@ -1,8 +1,7 @@
 """Controllers by name: energy shaping, teacher, policies, a user's policy, gain file or class."""
 
 import shlex
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 
@@ -28,14 +27,7 @@ MPC_TRUE_STATE = "mpc-true-state"
 ROBOT_FILE = "robot.toml"
 """The robot of a training, in the folder of its policy."""
 
-_FACTORIES: dict[str, Callable[..., protocol.Controller]] = {
-    ENERGY_SHAPING: energy_shaping.tuned_energy_shaping,
-    ENERGY_SHAPING_FLYING: partial(
-        energy_shaping.tuned_energy_shaping, gains=ENERGY_SHAPING_FLYING
-    ),
-    ENERGY_SHAPING_LITERAL: energy_shaping.paper_energy_shaping,
-    MPC_TRUE_STATE: mpc.TrueStateMpc,
-}
+_BUILT_IN = (ENERGY_SHAPING, ENERGY_SHAPING_FLYING, ENERGY_SHAPING_LITERAL, MPC_TRUE_STATE)
 _SHIPPED = resources.files("hopping_leg") / "policies"
 
 
@@ -53,7 +45,7 @@ def shipped_card(name: str) -> str:
 
 def controller_names() -> list[str]:
     """Return every name that ``load_controller`` knows."""
-    return [*_FACTORIES, *shipped_policies()]
+    return [*_BUILT_IN, *shipped_policies()]
 
 
 def load_policy(name_or_path: str | Path) -> Policy:
@@ -132,14 +124,16 @@ def load_controller(
         UsageError: There is no such controller, or it needs a simulated leg.
     """
     name = str(name_or_path)
-    if name in _FACTORIES:
-        if name == MPC_TRUE_STATE and not simulated:
+    if name == MPC_TRUE_STATE:
+        if not simulated:
             raise UsageError(
                 f"{name} sees the true state, which only `hop evaluate` and studies know; choose"
                 f" another controller, e.g. {ENERGY_SHAPING}."
             )
-        return _FACTORIES[name](robot, rate=rate)
-    if name.endswith(".toml"):
+        return mpc.TrueStateMpc(robot, rate=rate)
+    if name == ENERGY_SHAPING_LITERAL:
+        return energy_shaping.paper_energy_shaping(robot, rate=rate)
+    if name in _BUILT_IN or name.endswith(".toml"):
         return energy_shaping.tuned_energy_shaping(robot, rate=rate, gains=name)
     if user_controllers.is_user_controller(name):
         return user_controllers.load_user_controller(name, robot, rate)
