@@ -1,6 +1,6 @@
 """The steps of the chain for one twin: record, identify, train, tune, hop; each gives a record."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -77,7 +77,7 @@ def fit(twin: Twin, recordings: Sequence[Path], file: Path) -> Row:
     identified = identify([load_recording(path) for path in recordings], believed, options=options)
     save_robot(identified, file, twin.believed)
     found = as_json(identified)
-    before, after, truth = found["start_validation"], found["validation"], _truth(twin)
+    before, after, truth = found["start_validation"], found["validation"], simulated(twin.source)
     errors = ("closed_loop_position_rms_rad", "closed_loop_torque_rms_nm")
     kept = ("name", "unit", "start", "value", "interval_low", "interval_high", "at_bound",
             "bound_low", "bound_high")  # fmt: skip
@@ -87,23 +87,17 @@ def fit(twin: Twin, recordings: Sequence[Path], file: Path) -> Row:
         **{f"{name}_before": before[name] for name in errors},
         **{name: after[name] for name in errors},
         "parameters": [
-            {**{key: row[key] for key in kept}, "truth": truth(row["name"])}
+            {**{key: row[key] for key in kept}, "truth": _truth(truth, row["name"])}
             for row in found["parameters"]
         ],
     }
 
 
-def _truth(twin: Twin) -> Callable[[str], float | None]:
-    """Return what gives the twin's own value of a fitted number, None where it has none."""
-    robot = simulated(twin.source)
-    leg = LegHypothesis(robot)
-
-    def value(name: str) -> float | None:
-        if name.startswith("drive."):
-            return robot.reality.latency.command if name == "drive.delay" else None
-        return leg.get(name)
-
-    return value
+def _truth(robot: Robot, name: str) -> float | None:
+    """Return a twin's own value of a fitted number, None where it has none."""
+    if name == "drive.delay":
+        return robot.reality.latency.command
+    return None if name.startswith("drive.") else LegHypothesis(robot).get(name)
 
 
 def interval_ranges(parameters: Sequence[Row]) -> tuple[Range, ...]:

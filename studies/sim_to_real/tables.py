@@ -36,20 +36,13 @@ def tabulate(meanings: Mapping[str, str], trials: Sequence[Row]) -> Row:
                 **median_over_twins(tried, "median_error_m"),
                 "median_std_m": float(np.median(stds or [np.nan])),
             })  # fmt: skip
-    return {
-        "rows": rows,
-        **overall(meanings, trials),
-        "trials": list(trials),
-        "notes": statistics.twins_note(len(_by("twin", trials))),
-    }
-
-
-def overall(meanings: Mapping[str, str], trials: Sequence[Row]) -> Row:
-    """Return medians over all commands, and the other methods' errors over the first one's."""
     first, *others = meanings
     return {
+        "rows": rows,
         "methods": [_whole(n, m, _of(trials, "method", n)) for n, m in meanings.items()],
         "comparison": [compare(first, other, trials) for other in others],
+        "trials": list(trials),
+        "notes": statistics.twins_note(len(_by("twin", trials))),
     }
 
 
@@ -98,10 +91,8 @@ def _pooled(name: str, meaning: str, trials: Sequence[Row]) -> Row:
 
 
 def _whole(name: str, meaning: str, trials: Sequence[Row]) -> Row:
-    return {
-        **_pooled(name, meaning, trials),
-        "ordered": sum(map(_ordered, _runs(trials))),
-    }
+    ordered = sum(map(_ordered, _runs(trials)))
+    return {**_pooled(name, meaning, trials), "ordered": ordered}
 
 
 def _ordered(run: Sequence[Row]) -> bool:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.sim_to_real.tables import compare, overall, tabulate
+from studies.sim_to_real.tables import compare, tabulate
 
 
 def trials(errors, commands=(0.25, 0.35), **more):
@@ -57,7 +57,7 @@ def test_the_ratio_meets_the_same_twins():
 
 def test_order_is_of_the_apexes_and_a_leg_that_stands_has_none():
     rows = trials({"identified": {"a": (0.0, -0.099), "b": (0.06, -0.05), "c": (0.0, 0.0)}})
-    assert overall({"identified": ""}, rows)["methods"][0]["ordered"] == 2
+    assert tabulate({"identified": ""}, rows)["methods"][0]["ordered"] == 2
     for row in rows[-2:]:
         row["motionless"] = True
-    assert overall({"identified": ""}, rows)["methods"][0]["ordered"] == 1
+    assert tabulate({"identified": ""}, rows)["methods"][0]["ordered"] == 1
