@@ -21,7 +21,7 @@ CEILINGS = {
     "src/hopping_leg/sim/**/*.py": (13, 2520),
     "src/hopping_leg/viewer/**/*.py": (8, 1400),
     "src/**/*.py": (198, 31280),
-    "tests/**/*.py": (147, 16810),
+    "tests/**/*.py": (145, 16720),
     "studies/**/*.py": (83, 8430),
     "docs/**/*.md": (22, 2520),
     "docs/live/*.js": (13, 1490),

@@ -37,13 +37,6 @@ def test_the_foot_follows_the_papers_formula(bend, swing):
     assert (np.sign(angles[:, 1]) == (-1 if bend == "backward" else 1)).all()
 
 
-def test_strokes_join_without_a_jump():
-    template = fixed_base((0.1, 0.08), (0.75, 0.6), (10.0,), duration=41.0, margin=0.005)
-    excitation = make_excitation(template, ROBOT)
-    steps = np.abs(np.diff(excitation.position, axis=0)).max(axis=0)
-    assert (steps < ROBOT.of_joints("no_load_speed") / excitation.rate).all()
-
-
 @pytest.mark.parametrize("robot", ["legv2", "legv2-paper", "legv1", "doublependulum"])
 @pytest.mark.parametrize("template", [fixed_base(), moving_base()], ids=["fixed", "moving"])
 def test_the_adapted_grid_can_be_played(robot, template):

@@ -100,12 +100,6 @@ def test_what_tells_the_zeros_is_not_predicted():
     assert max(open_loop([ZEROED], TRUE, 0.2, STEP)) < 2e-3
 
 
-@pytest.mark.parametrize("onboard", ["zoh", "continuous"])
-def test_a_drive_that_tracks_positions_is_believed(onboard):
-    run = record(PENDULUM, swing(1.0)).with_metadata(onboard=onboard, zeroed=True)
-    np.testing.assert_array_equal(simulated(run), simulated(run.with_metadata(zeroed=False)))
-
-
 @pytest.mark.parametrize(
     ("name", "step"),
     [("drive.delay", 2e-5), ("hip.friction", 1e-3), ("shank.com", 2e-4), ("knee.armature", 2e-5)],

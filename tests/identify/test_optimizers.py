@@ -37,24 +37,6 @@ def test_cma_es_finds_the_bottom_of_a_bowl_and_by_shares_ends_where_they_agree()
     np.testing.assert_allclose(shared.vector, BOTTOM, atol=3e-3)
 
 
-SHIFTS = 0.3 * np.random.default_rng(0).normal(size=(5, 2))
-SHIFTS -= SHIFTS.mean(axis=0)
-SHARES = [lambda vectors, shift=shift: squares(vectors - shift) / len(SHIFTS) for shift in SHIFTS]
-"""Bowls with different bottoms, that of their sum at (1, -0.5)."""
-
-
-def sum_of_shares(vectors):
-    return sum(share(vectors) for share in SHARES)
-
-
-def test_shares_in_turn_find_the_bottom_of_their_sum():
-    found = cma_es(sum_of_shares, TWO, SearchOptions(generations=80), seed=3, shares=SHARES)
-    assert found.cost == sum_of_shares(found.vector[None])[0] == found.history[-1]
-    own = sum_of_shares(SHIFTS + BOTTOM)
-    (least,) = sum_of_shares(BOTTOM[None])
-    assert found.cost - least < 0.05 * (own.mean() - least)
-
-
 @pytest.mark.parametrize("groups", [None, np.arange(2)], ids=["one-sided", "two-sided"])
 def test_differences_stay_inside_the_bounds(groups):
     low, high = TWO.bounds

@@ -23,13 +23,6 @@ def test_parameters_that_make_no_sense_get_a_sentence(names, sentence):
         choose(CAD, names)
 
 
-def test_vectors_and_values_are_inverse():
-    values = np.array([0.3, 0.2])
-    np.testing.assert_allclose(TWO.values(TWO.vector(values)), values)
-    (hypothesis,) = TWO.hypotheses(TWO.vector(values)[None])
-    assert hypothesis.get("hip.friction") == pytest.approx(0.3)
-
-
 def test_only_the_sum_of_armature_and_inertia_is_identifiable():
     run = record(CAD.replace(TRUTH).robot, swing(1.0))
     parameters = choose(CAD.replace(TRUTH), ["hip.friction", "hip.armature", "thigh.inertia"])

@@ -354,8 +354,3 @@ def test_what_was_not_recorded_or_is_in_revolutions_is_said_once():
     alone = load(swinging().drop(missing, VELOCITIES[1]))
     assert f"'{missing}' was not recorded" in one_warning(alone)
     assert "not in revolutions" in one_warning(load(scaled(swinging(), turned, 0.159)))
-
-
-def test_quantised_positions_still_have_their_velocity():
-    coarse = swinging().with_columns((pl.col(POSITIONS) / 3e-3).round() * 3e-3)
-    assert load(coarse).warnings == ()

@@ -69,16 +69,6 @@ def test_draws_have_the_intervals_quantiles_and_stay_within_what_is_possible():
         check_physics(found.hypothesis.replace(dict(zip(known.names, row, strict=True))).robot, "")
 
 
-def test_what_nothing_is_known_of_is_drawn_from_all_between_its_bounds():
-    found = identified()
-    blind = dataclasses.replace(found.identifiability, half_width=np.array([np.inf, 1.0]))
-    drawn = dataclasses.replace(found, identifiability=blind).posterior(2000)[:, 0]
-    first = found.passes[-1].parameters.parameters[0]
-    np.testing.assert_allclose(
-        np.quantile(drawn, [0.25, 0.75]), [first.high / 4, 3 * first.high / 4], rtol=0.1
-    )
-
-
 def test_the_posterior_is_written_with_names_and_units():
     found = identified()
     assert "posterior" not in as_json(found)
