@@ -67,7 +67,7 @@ class View:
         with chromium() as browser:
             start = self._start_seconds(browser)
             live = _Noting(self.controllers, DEFAULT_ROBOT, 0.30)
-            viewer = Viewer(live, DEFAULT_ROBOT, port=0)
+            viewer = Viewer(live, port=0)
             with running(viewer):
                 page = new_page(browser)
                 wait_for_leg(page, viewer)

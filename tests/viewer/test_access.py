@@ -68,7 +68,7 @@ class Served:
 
     def __enter__(self):
         live = LiveSimulation(("energy-shaping",), "legv2-paper", 0.3)
-        self.viewer = Viewer(live, "legv2-paper", port=0)
+        self.viewer = Viewer(live, port=0)
         host, port = self.viewer.address.removeprefix("http://").split(":")
         return host, int(port)
 
@@ -101,13 +101,13 @@ def test_the_page_cannot_name_a_file_or_a_class(tmp_path):
     viser = pytest.importorskip("viser")
     server = viser.ViserServer(port=0, verbose=False)
     live, queue = LiveSimulation(("energy-shaping",), "legv2-paper", 0.3), GuiQueue()
-    panel = LivePanel(server, queue, live, "legv2-paper")
+    panel = LivePanel(server, queue, live)
     for handle, name in itertools.product(
         (panel._first, panel._second, panel._robot), (f"{plug_in}:Mine", "/etc/passwd", "x.toml")
     ):
         before = (live.names, live.robot)
         shown, handle._impl.value = handle.value, name
-        queue.put(panel._set_robot if handle is panel._robot else panel._controllers)
+        queue.put(panel._begin)
         (complaint,) = queue.run()
         assert "does not offer" in complaint
         assert (live.names, live.robot) == before

@@ -67,7 +67,7 @@ def choose(page, label, option):
 @contextlib.contextmanager
 def simulated(page, controller, height):
     live = LiveSimulation((controller,), ROBOT, height)
-    viewer = Viewer(live, ROBOT, port=0)
+    viewer = Viewer(live, port=0)
     with running(viewer):
         wait_for_leg(page, viewer)
         yield live, viewer

@@ -52,7 +52,7 @@ def test_heights_are_brought_into_what_every_controller_can_be_asked_for():
     assert other.valid[1] > high
     other.set_height(0.45)
     other.advance(0.2)
-    other.set_controllers(("fast",))
+    other.begin(("fast",), ROBOT)
     other.advance(0.2)
     assert other.height == pytest.approx(other.valid[1], abs=1e-3)
 
@@ -80,7 +80,7 @@ def test_a_push_moves_the_base_and_ends():
 
 def test_a_second_leg_hops_beside_the_first_and_settings_change_the_motion():
     live = quiet("energy-shaping")
-    live.set_controllers(("energy-shaping", "energy-shaping"))
+    live.begin(("energy-shaping", "energy-shaping"), ROBOT)
     live.advance(0.4)
     np.testing.assert_array_equal(heights(live, 0), heights(live, 1))
     changes = {"payload": 0.6}, {"time_constant": 0.02}, {"delay": 0.02}, {"noise": True}
@@ -95,13 +95,13 @@ def test_a_refused_wish_changes_nothing():
     live = quiet("energy-shaping")
     tracks = live.tracks
     with pytest.raises(UsageError, match="no controller 'nobody'"):
-        live.set_controllers(("nobody",))
+        live.begin(("nobody",), ROBOT)
     with pytest.raises(RobotError):
-        live.set_robot("nothing")
+        live.begin(("fast",), "nothing")
     with pytest.raises(RobotError, match="cannot hop"):
-        live.set_robot("doublependulum")
+        live.begin(("fast",), "doublependulum")
     with pytest.raises(UsageError, match="one, or two"):
-        live.set_controllers(("fast",) * 3)
+        live.begin(("fast",) * 3, ROBOT)
     assert live.names == ("energy-shaping",)
     assert live.robot.name == ROBOT
     assert live.tracks is tracks
@@ -111,7 +111,7 @@ def test_a_refused_wish_changes_nothing():
 def test_another_robot_begins_anew_with_its_own_settings():
     live = quiet("energy-shaping")
     live.set_settings(dataclasses.replace(live.settings, payload=0.5))
-    live.set_robot("legv2")
+    live.begin(live.names, "legv2")
     assert live.settings == default_settings(load_robot("legv2"))
     live.advance(0.3)
     assert live.tracks[0].robot.name == "legv2"

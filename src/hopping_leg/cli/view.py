@@ -57,13 +57,10 @@ class View:
 
 def run(args: View) -> None:
     """Serve the page until Ctrl-C."""
-    from hopping_leg.controllers.registry import robot_of
-
     source = _source(args)
     from hopping_leg.viewer.viewer import Viewer
 
-    robot = args.robot or robot_of(args.controllers)
-    viewer = Viewer(source, robot, port=args.port)
+    viewer = Viewer(source, port=args.port)
     say(f"Open {viewer.address} in a browser; Ctrl-C stops.")
     screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if args.browser and (screen or sys.platform in ("win32", "darwin")):

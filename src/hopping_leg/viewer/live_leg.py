@@ -114,7 +114,7 @@ class LiveSimulation:
         self.names: tuple[str, ...] = ()
         self._compiling = start_compiling() if at_once else None
         self._in_mujoco = False
-        self._begin(controllers, self.robot)
+        self.begin(controllers, robot)
 
     def advance(self, seconds: float) -> None:
         """Let simulated time pass, in whole ticks."""
@@ -164,23 +164,13 @@ class LiveSimulation:
         for leg in self._legs:
             leg.stand(self.height)
 
-    def set_controllers(self, names: tuple[str, ...]) -> None:
-        """Begin anew with other controllers.
+    def begin(self, names: tuple[str, ...], robot_name: str) -> None:
+        """Begin anew with controllers on a robot; another robot has its own settings.
 
         Raises:
-            UsageError: As for the constructor; everything stays as it was.
+            UsageError, RobotError: As for the constructor; everything stays as it was.
         """
-        self._begin(names, self.robot)
-
-    def set_robot(self, robot: str) -> None:
-        """Begin anew with another robot and its own settings.
-
-        Raises:
-            RobotError: As for the constructor; everything stays as it was.
-        """
-        self._begin(self.names, load_robot(robot))
-
-    def _begin(self, names: tuple[str, ...], robot: Robot) -> None:
+        robot = load_robot(robot_name)
         robot.require_leg()
         if not 1 <= len(names) <= MOST:
             raise UsageError(f"{len(names)} controllers were given; give one, or two side by side.")
@@ -188,7 +178,7 @@ class LiveSimulation:
         self.valid = _shared_range(loaded, robot)
         if robot != self.robot:
             self.settings = default_settings(robot)
-        self.robot, self.names = robot, names
+        self.robot, self.robot_name, self.names = robot, robot_name, names
         self.set_height(self.height)
         changed = self.settings.apply(robot)
         self._in_mujoco = self._compiling is not None and changed.reality.neutral

@@ -99,27 +99,25 @@ _SETTINGS = {
 
 
 class LivePanel:
-    """Puts what the page asks for to a live simulation, started with a robot's name or file."""
+    """Puts what the page asks for to a live simulation."""
 
     def __init__(
-        self, server: viser.ViserServer, queue: GuiQueue, live: live_leg.LiveSimulation, robot: str
+        self, server: viser.ViserServer, queue: GuiQueue, live: live_leg.LiveSimulation
     ) -> None:
         self._live = live
         gui = server.gui
         hint = "Commanded apex; keys K and J"
         self._height = _slider(gui, "Height, m", live.valid, HEIGHT_STEP, live.height, hint)
         self._height.on_update(queue.from_page(self._set_height))
-        names = (*controller_names(), *(n for n in live.names if n not in controller_names()))
-        self._names = names
+        names = self._names = tuple(dict.fromkeys((*controller_names(), *live.names)))
         self._first = gui.add_dropdown("Controller", names, initial_value=live.names[0])
         beside = live.names[1] if len(live.names) > 1 else NOBODY
         self._second = gui.add_dropdown("Beside it", (NOBODY, *names), initial_value=beside)
-        for dropdown in (self._first, self._second):
-            dropdown.on_update(queue.from_page(self._controllers))
         legs = [name for name in shipped_robots() if load_robot(name).kind == "leg"]
-        self._robots = tuple(legs if robot in legs else [*legs, robot])
-        self._robot = gui.add_dropdown("Robot", self._robots, initial_value=robot)
-        self._robot.on_update(queue.from_page(self._set_robot))
+        self._robots = tuple(dict.fromkeys((*legs, live.robot_name)))
+        self._robot = gui.add_dropdown("Robot", self._robots, initial_value=live.robot_name)
+        for dropdown in (self._first, self._second, self._robot):
+            dropdown.on_update(queue.from_page(self._begin))
         stand = gui.add_button("Stand up", icon=viser.Icon.RELOAD, hint="Begin anew; key R")
         stand.on_click(queue.from_page(live.stand))
         with gui.add_folder("Not told to the controller"):
@@ -157,18 +155,12 @@ class LivePanel:
     def _change(self, by: float) -> None:
         put_value(self._height, self._live.set_height(self._live.height + by))
 
-    def _controllers(self) -> None:
+    def _begin(self) -> None:
         try:
             names: tuple[str, ...] = (chosen(self._first, self._names),)
             if self._second.value != NOBODY:
                 names += (chosen(self._second, self._names),)
-            self._live.set_controllers(names)
-        finally:
-            self._show()
-
-    def _set_robot(self) -> None:
-        try:
-            self._live.set_robot(chosen(self._robot, self._robots))
+            self._live.begin(names, chosen(self._robot, self._robots))
         finally:
             self._show()
 
@@ -190,6 +182,7 @@ class LivePanel:
         put_value(self._height, live.height)
         put_value(self._first, live.names[0])
         put_value(self._second, live.names[1] if len(live.names) > 1 else NOBODY)
+        put_value(self._robot, live.robot_name)
         put_value(self._noise, live.settings.noise)
         for name, slider in self._sliders.items():
             put_value(slider, self._setting(name))

@@ -44,16 +44,13 @@ class Viewer:
 
     Args:
         source: What is shown.
-        robot: Name or file that a live simulation was started with.
         port: Port to listen at; if it is in use, the next free one.
 
     Raises:
         UsageError: There is no such port.
     """
 
-    def __init__(
-        self, source: data_source.DataSource, robot: str = "", *, port: int = 8080
-    ) -> None:
+    def __init__(self, source: data_source.DataSource, *, port: int = 8080) -> None:
         self._source = source
         self._server = _serve(port)
         self.address = f"http://{_HOST}:{self._server.get_port()}"
@@ -68,7 +65,7 @@ class Viewer:
         self._status = gui.add_html("")
         self._replay_panel: panels.ReplayPanel | None = None
         if isinstance(source, live_leg.LiveSimulation):
-            panels.LivePanel(self._server, self._queue, source, robot)
+            panels.LivePanel(self._server, self._queue, source)
         if isinstance(source, data_source.ReplaySource):
             self._replay_panel = panels.ReplayPanel(self._server, self._queue, source)
         if not isinstance(source, data_source.RecorderSource):
