@@ -88,7 +88,7 @@ class _TaskView:
     def _begin(self, seed: int | None, command: Array | None) -> Array32:
         again, self._seeded = self._seeded and seed is None, True
         task = self.task
-        return task.reset(None, command) if again else task.reseed(self.np_random, None, command)
+        return task.reset(None, command) if again else task.reseed(self.np_random, command)
 
 
 def _numbers(action: Any) -> Array:  # noqa: ANN401

@@ -117,7 +117,8 @@ class HoppingTask:
     def _take(self, robot: Robot, noise: np.random.Generator) -> None:
         """Set what depends on whether legs differ."""
         options, legs = self.options, self.task_legs
-        self._ranges = np.array([leg.command_range for leg in legs])
+        ranges = [leg.command_range for leg in legs] or [options.command_bounds] * self.count
+        self._ranges = np.array(ranges)
         disturbed = np.array([leg.disturbed for leg in legs]) if legs else None
         self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise, disturbed)
         believed = [leg.believed for leg in legs] or [robot]
@@ -151,18 +152,12 @@ class HoppingTask:
         """Entries of the true state that a critic may see."""
         return PRIVILEGED + len(self.options.randomised)
 
-    def reseed(
-        self, rng: np.random.Generator, ids: IntArray | None = None, command: Array | None = None
-    ) -> Array32:
-        """Take all randomness from another source and begin anew, see ``reset``.
-
-        Where only some legs begin anew, all keep the numbers in which they differ.
-        """
+    def reseed(self, rng: np.random.Generator, command: Array | None = None) -> Array32:
+        """Take all randomness from another source and begin anew, see ``reset``."""
         noise, self._rng, legs = rng.spawn(3)
         self.plant.reseed(noise)
-        if ids is None:
-            self._randomize(int(legs.integers(2**62)))
-        return self.reset(ids, command)
+        self._randomize(int(legs.integers(2**62)))
+        return self.reset(None, command)
 
     def reset(self, ids: IntArray | None = None, command: Array | None = None) -> Array32:
         """Begin new episodes of some legs, or of all, staggered; return all observations.
@@ -334,14 +329,10 @@ class HoppingTask:
         self._plan()
 
     def _draw_commands(self, rows: IntArray) -> Array:
-        count = len(rows)
-        if len(self._ranges):
+        if self.task_legs or self.options.command_range is not None:
             low, high = self._ranges[rows].T
-            return self._rng.uniform(low, high, count)
-        if self.options.command_range is not None:
-            low, high = self.options.command_range
-            return self._rng.uniform(low, high, count)
-        return self._rng.choice(self.options.commands, count)
+            return self._rng.uniform(low, high, len(rows))
+        return self._rng.choice(self.options.commands, len(rows))
 
     def _draw_holds(self, count: int) -> IntArray:
         """Return after how many ticks commands change, (count,)."""
