@@ -53,33 +53,25 @@ def load_entries(names: Sequence[str], robot: Robot, rate: float) -> list[Entry]
     return _grouped([_load(label, source, robot, rate) for label, source in expanded])
 
 
-def check_labels(entries: Sequence[Entry]) -> None:
-    """Check that there is something to judge, under names that differ.
+def check_entries(entries: Sequence[Entry], commands: Sequence[float]) -> None:
+    """Check that there is something to judge, under names that differ, and what it is asked for.
 
     Raises:
-        UsageError: There is not.
+        UsageError: There is not, or a height, m, is outside of the range of an entry's training.
     """
     labels = [entry.label for entry in entries]
     if not labels:
         raise UsageError("No controller was named; try `hop evaluate energy-shaping`.")
-    for label in labels:
-        if labels.count(label) > 1:
-            raise UsageError(f"Controller '{label}' was named twice; name each one once.")
-
-
-def check_range(entry: Entry, commands: Sequence[float]) -> None:
-    """Check that an entry may be asked for heights, m.
-
-    Raises:
-        UsageError: One is outside of the range that it was trained for.
-    """
-    for height in commands:
-        if entry.command_range and not entry.reaches([height]):
-            low, high = entry.command_range
-            raise UsageError(
-                f"'{entry.label}' cannot be asked for {height:g} m: it was trained for"
-                f" {low:g} to {high:g} m; choose --commands within that range."
-            )
+    for entry in entries:
+        if labels.count(entry.label) > 1:
+            raise UsageError(f"Controller '{entry.label}' was named twice; name each one once.")
+        for height in commands:
+            if entry.command_range and not entry.reaches([height]):
+                low, high = entry.command_range
+                raise UsageError(
+                    f"'{entry.label}' cannot be asked for {height:g} m: it was trained for"
+                    f" {low:g} to {high:g} m; choose --commands within that range."
+                )
 
 
 def fingerprint(controller: Controller) -> str:

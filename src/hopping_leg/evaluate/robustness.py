@@ -17,7 +17,7 @@ from scipy.stats import qmc
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.evaluate import metrics, runner, statistics, trials
-from hopping_leg.evaluate.entries import Entry, check_labels, check_range, fingerprint
+from hopping_leg.evaluate.entries import Entry, check_entries, fingerprint
 from hopping_leg.evaluate.result import ResultCache
 from hopping_leg.evaluate.robustness_axes import AXES, NOMINAL, Axis, Case, axes_named
 from hopping_leg.io import safe_file_name
@@ -108,9 +108,7 @@ def run_suite(
     Raises:
         UsageError: A command is out of an entry's range, or a name is taken twice.
     """
-    check_labels(entries)
-    for entry in entries:
-        check_range(entry, suite.commands)
+    check_entries(entries, suite.commands)
     versions, parts = runner.software_versions(), (NOMINAL, *suite.axes)
     asked = {
         **suite.conditions,

@@ -9,7 +9,7 @@ import numpy as np
 
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.evaluate import aggregation, motor_load, result, trials
-from hopping_leg.evaluate.entries import Entry, check_labels, check_range
+from hopping_leg.evaluate.entries import Entry, check_entries
 from hopping_leg.io import versions
 from hopping_leg.robot import JOINTS, TIMESTEP, braking_times
 from hopping_leg.sim import NO_NOISE
@@ -51,11 +51,11 @@ def evaluate(
             or there is nothing to do.
     """
     trials.check_repeats(repeats)
-    check_labels(entries)
     heights = trials.choose_commands(setup.robot, commands)
+    check_entries(entries, heights if commands is not None else ())
     for entry in entries:
-        if commands is not None or not any(entry.reaches([height]) for height in heights):
-            check_range(entry, heights)
+        if not any(entry.reaches([height]) for height in heights):
+            check_entries([entry], heights)
     planned = [t for t in trials.paper_trials(setup.robot, heights) if t.kind in kinds]
     world = replace(setup, robot=trials.floor_robot(setup.robot, floor))
     notes = _note_setup(setup)
