@@ -113,7 +113,6 @@ def write_bad(folder):
         (["good.csv", "--validate", "good.csv"], "use each for one of the two"),
         (["good.csv", "--robot", "legv9"], "There is no robot 'legv9'"),
         (["good.csv", "--robot", "legv1"], "another leg's robot file"),
-        (["good.csv", "--robot", "doublependulum"], "is a pendulum"),
         (["good.csv", "--parameters", "hip.frction"], "Did you mean 'hip.friction'"),
         (["good.csv", "--search", "cmaes"], "Did you mean 'cma'"),
         (["good.csv", "--bounds", "hip.friction=0.5,1"], "exclude its start 0.0412"),
