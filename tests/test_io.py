@@ -107,6 +107,7 @@ def test_one_entry_is_replaced_and_the_rest_stays():
 def test_versions_leave_out_what_is_not_installed():
     assert set(io.versions("numpy", "no-such-package")) == {"python", "numpy"}
     assert io.safe_file_name("my leg/v2.1") == "my_leg_v2.1"
+    assert io.safe_file_name("\x1b" * 300) == "_" * 80
 
 
 def some_trace():

@@ -127,8 +127,8 @@ def plain(value: Any) -> Any:  # noqa: ANN401
 
 
 def safe_file_name(text: str) -> str:
-    """Return a text with all but letters, digits, ``-``, ``_`` and ``.`` replaced by ``_``."""
-    return "".join(c if c.isalnum() or c in "-_." else "_" for c in text)
+    """Return a text's first 80 characters, all but letters, digits, ``-_.`` replaced by ``_``."""
+    return "".join(c if c.isalnum() or c in "-_." else "_" for c in text[:80])
 
 
 def versions(*packages: str) -> dict[str, str]:

@@ -139,7 +139,7 @@ class Scene:
             hopping_poses(self.robot),
             SoftLimiter(self.robot, SoftLimits()),
             dataclasses.replace(timing, hop=_FIRST_HOP + self.mishap.at + _AFTERWARDS),
-            checked=self.robot if self.family.grounded else None,
+            checked=self.robot if self.family.grounded or self.family.lies else None,
         )
         self.require_fitness(link)
         header, file = header_of(self.robot, controller, CONTROL_RATE), folder / "run.parquet"

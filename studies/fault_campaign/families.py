@@ -51,6 +51,7 @@ class Family:
         name: As in results.
         draw: Returns one.
         reasons: For which the run may end; ``FINISHED`` where it may go on.
+        lies: Whether the leg's true state is asked, and faults begin from arming to sinking.
         refused: Whether the leg must not be armed.
         grounded: Whether it must not hop.
     """
@@ -58,6 +59,7 @@ class Family:
     name: str
     draw: Draw
     reasons: tuple[Reason, ...] = ()
+    lies: bool = False
     refused: bool = False
     grounded: bool = False
 
@@ -192,6 +194,35 @@ def _double(rng: np.random.Generator) -> Mishap:
     return Mishap(first, second, at=at)
 
 
+LIES = 4.0
+"""Lies begin at a random time of this long after power, s: rise, squat, hops, sinking."""
+
+_LIES: dict[str, Values] = {
+    "encoder_dead": lambda _: {},
+    "sample_frozen": lambda _: {},
+    "stale_sample": lambda rng: {"drive": "both", "value": float(rng.choice([0.005, 0.01]))},
+    "torque_false": _one_of([0, -1]),
+    "velocity_false": lambda rng: {"value": float(rng.choice([0.5, 2.0, -1.0]))},
+    "swapped_replies": lambda _: {"drive": "both"},
+    "same_id": lambda rng: {"drive": str(rng.choice(["hip", "knee"]))},
+    "fast_clock": lambda rng: {"value": float(10 ** rng.uniform(-2, 1) + 1)},
+}
+"""Kinds of fault in which a drive answers in time, and not the truth."""
+
+
+def _lie(kind: str, second: bool = False) -> Draw:
+    """Return what draws a lie from arming to sinking, with a severe fault soon after if asked."""
+
+    def draw(rng: np.random.Generator) -> Mishap:
+        at = float(rng.uniform(0, LIES))
+        chosen = kind or str(rng.choice(list(_LIES)))
+        lie = Fault(chosen, at=at, **{"drive": _drive(rng), **_LIES[chosen](rng)})
+        other = _severe("powered", at, at + 0.1)(rng).fault if second else None
+        return Mishap(lie, other, at=HOP_SECONDS)
+
+    return draw
+
+
 _R = Reason
 _GLITCH = (_R.FINISHED, _R.REPLIES_MISSING)
 _FLIPPED = (
@@ -205,6 +236,12 @@ _STOPS = (
     _R.VOLTAGE_HIGH, _R.VOLTAGE_LOW, _R.POSITION_LIMIT,
 )  # fmt: skip
 """What severe faults are noticed by."""
+_LIED = (
+    _R.FINISHED, _R.ENCODER_DEAD, _R.VELOCITY_FALSE, _R.TORQUE_FALSE, _R.SAMPLES_STALE,
+    _R.DRIVE_CLOCK, _R.ENCODER_JUMP, _R.ENCODER_DRIFT, _R.POSITION_LIMIT, _R.SPEED_LIMIT,
+    _R.STANDS_WRONG, _R.REPLIES_MISSING, _R.DRIVE_TIMEOUT, _R.CONTROLLER_FAILED,
+)  # fmt: skip
+"""What lies are noticed by; a run may end as planned where one did no harm."""
 _MISWIRED = (_R.STANDS_WRONG, _R.POSITION_LIMIT, _R.SPEED_LIMIT)
 _DRIFT = (_R.ENCODER_DRIFT, _R.ENCODER_JUMP, _R.POSITION_LIMIT)
 
@@ -238,6 +275,15 @@ FAMILIES = {
         Family("fault at lift-off", _severe("flight", 0.0, 0.005), _STOPS),
         Family("fault while sinking", _severe("flight", 1.0, 1.6), _STOPS),
         Family("double fault", _double, _STOPS),
+        Family("dead encoder", _lie("encoder_dead"), _LIED, lies=True),
+        Family("frozen sample", _lie("sample_frozen"), _LIED, lies=True),
+        Family("stale samples", _lie("stale_sample"), _LIED, lies=True),
+        Family("false torque", _lie("torque_false"), _LIED, lies=True),
+        Family("false velocity", _lie("velocity_false"), _LIED, lies=True),
+        Family("swapped replies", _lie("swapped_replies"), _LIED, lies=True),
+        Family("one id for two", _lie("same_id"), _LIED, lies=True),
+        Family("fast clock", _lie("fast_clock"), _LIED, lies=True),
+        Family("lie and fault", _lie("", second=True), (*_LIED, *_STOPS), lies=True),
         Family("stalled host", _stall, (_R.LOOP_STALLED, _R.DRIVE_TIMEOUT)),
         Family("killed host", _death),
         Family("wrong boot pose", _pose, refused=True),

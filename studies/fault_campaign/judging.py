@@ -8,18 +8,28 @@ from pathlib import Path
 
 import numpy as np
 
+from hopping_leg.arrays import Array
 from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.deploy.hardware_trials import Performance
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.errors import TraceError
+from hopping_leg.robot.parameters import JOINTS
+from hopping_leg.trace import Trace
 from studies.fault_campaign.case import Result, Scene
 from studies.fault_campaign.families import Family
-from studies.fault_campaign.verdict import problems_of_commands, reaction, restarts
+from studies.fault_campaign.verdict import SAFE, problems_of_commands, reaction, restarts
 from studies.fault_campaign.wire_log import WireLog
 
 BRAKED_WITHIN = 0.025
 """Time from the host's death within which the drives must brake, s."""
+
+FAR, LIED_WITHIN = 0.05, 0.05
+"""Difference of a joint's angle from what its drive says that matters, rad; time for which the
+drives may be powered after that, s."""
+
+PUSHED = 0.1
+"""Share of its largest torque from which on a joint counts as pushed."""
 
 
 def judge_wire(result: Result, scene: Scene, log: WireLog, modes: Sequence[int]) -> None:
@@ -41,6 +51,44 @@ def judge_wire(result: Result, scene: Scene, log: WireLog, modes: Sequence[int])
         result.problems.append("no safe command followed a bad answer")
     if DriveMode.POSITION in modes:
         result.problems.append("a drive is still in torque mode at the end")
+
+
+def judge_truth(result: Result, scene: Scene, log: WireLog, truth: Array, trace: Trace) -> None:
+    """Add what the leg's true state tells of a trial in which a drive lied.
+
+    No joint may stand at its stop while pushed. A lie about positions matters from when a joint is
+    farther from what its drive says than ``FAR``: from then on the drives may be powered for
+    ``LIED_WITHIN``. Samples that are old are as false at once, but not for long.
+
+    Args:
+        result: To be added to; the mishap has begun.
+        scene: Of the trial.
+        log: Of the wire.
+        truth: Of the leg, as ``Lockstep`` has it.
+        trace: Of the run.
+    """
+    assert result.began is not None
+    kinds = {fault.kind for fault in (scene.mishap.fault, scene.mishap.second) if fault}
+    time, true = truth[:, 0], truth[:, 3:5]
+    off = [told.time for told in log.commands if told.mode in SAFE and told.time >= result.began]
+    until = min(off, default=math.inf)
+    said_at = trace.column("time_s") + time[0]
+    for joint, name in enumerate(JOINTS):
+        model = getattr(scene.robot, name)
+        said = trace.column(f"{name}_position_rad")
+        where = np.interp(said_at, time, true[:, joint])
+        wrong = said_at[(np.abs(where - said) > FAR) & (said_at >= result.began)]
+        if wrong.size and wrong[0] <= until:
+            powered = until - wrong[0]
+            result.reaction = max(result.reaction or 0.0, powered)
+            if powered > LIED_WITHIN and "stale_sample" not in kinds:
+                result.problems.append(
+                    f"{name}: powered for {powered:.3f} s after its lie mattered"
+                )
+        pushed = np.abs(trace.column(f"{name}_sent_nm")) > PUSHED * model.torque_limit
+        beyond = (where <= model.stop_lower) | (where >= model.stop_upper)
+        if (beyond & pushed & (said_at >= result.began) & (said_at <= until)).any():
+            result.problems.append(f"{name}: it stood at its stop while it was pushed")
 
 
 def judge_trace(result: Result, done: Performance, family: Family | None) -> None:

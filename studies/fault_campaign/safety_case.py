@@ -15,13 +15,13 @@ def upper_bound(trials: int, failures: int) -> float | None:
     return None if failures or not trials else 1 - (1 - _CONFIDENCE) ** (1 / trials)
 
 
-def rows(campaign: dict[str, Any]) -> list[dict[str, Any]]:
+def rows(*campaigns: dict[str, Any]) -> list[dict[str, Any]]:
     """Return a row per family: what happens, what notices it, what follows, how often it was tried.
 
     Args:
-        campaign: Results of the campaign.
+        campaigns: Results; of a family that several have tried the last counts.
     """
-    tried = {row["family"]: row for row in campaign["rows"]}
+    tried = {row["family"]: row for campaign in campaigns for row in campaign["rows"]}
     none = {"trials": 0, "unsafe": 0, "reaction_p99_s": None, "braked_max_s": None}
     return [_row(family, tried.get(name, none)) for name, family in FAMILIES.items()]
 
@@ -31,6 +31,9 @@ def _row(family: Family, tried: dict[str, Any]) -> dict[str, Any]:
     goes_on = any(reason.name == "FINISHED" for reason in family.reasons)
     if family.refused:
         noticed, follows = "the checks before arming", "the leg is not armed"
+    elif family.lies:
+        noticed = "what a drive says, against itself and against what it was told"
+        follows = "the drives brake, or it hops on unharmed"
     elif family.name == "killed host":
         noticed, follows = "the drives' watchdogs", "the drives brake by themselves"
     else:

@@ -6,6 +6,8 @@ import tempfile
 import threading
 from pathlib import Path
 
+import numpy as np
+
 from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.emulator.drive import EmulatedDrive
 from hopping_leg.emulator.leg import TIMESTEP
@@ -18,6 +20,7 @@ from studies.fault_campaign.families import Family
 from studies.fault_campaign.judging import (
     judge_braking,
     judge_trace,
+    judge_truth,
     judge_wire,
     problems_of_box,
     start_host,
@@ -151,6 +154,8 @@ def _hop(scene: Scene) -> Result:
     judge_wire(result, scene, log, modes)
     if done is not None:
         judge_trace(result, done, scene.family)
+        if scene.family.lies:
+            judge_truth(result, scene, log, np.array(lockstep.truth), done.trace)
         return result
     judge_braking(result, clock.braked)
     return result

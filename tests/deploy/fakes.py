@@ -36,7 +36,7 @@ class FakeClock:
 
 
 class FakeLink:
-    """Two inert joints in honey; ``alter(tick, joint, reply)`` changes or drops a reply."""
+    """Two noisy joints in honey; ``alter(tick, joint, reply)`` changes or drops a reply."""
 
     def __init__(self, clock, alter=lambda tick, joint, reply: reply, latency=5e-4):
         self.clock, self.alter, self.latency = clock, alter, latency
@@ -66,8 +66,11 @@ class FakeLink:
         pass
 
     def _reply(self, joint, taken):
-        position, velocity = float(self.q[joint]), float(self.qd[joint])
-        return Reply(position, velocity, 0.0, int(self.mode[joint]), 0, 24.0, 30.0, taken)
+        noise = 1e-5 * (-1) ** self.tick
+        position, velocity = float(self.q[joint]) + noise, float(self.qd[joint])
+        mode = self.mode[joint]
+        given = self._command.torque[joint] if mode is DriveMode.POSITION else 0.0
+        return Reply(position, velocity, given, int(mode), 0, 24.0, 30.0, taken)
 
     def _move(self):
         elapsed, self._moved = self.clock.time - self._moved, self.clock.time

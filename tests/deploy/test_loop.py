@@ -307,3 +307,19 @@ def test_processors_are_told_to_stay_awake_as_long_as_the_loop_runs(tmp_path, mo
     monkeypatch.setattr(realtime, "_LATENCY", tmp_path / "none")
     with realtime.processors_awake() as notice:
         assert notice is None
+
+
+def test_a_controller_that_changes_what_it_is_given_changes_nothing_else(tmp_path):
+    class Changing(Still):
+        def act(self, measurement):
+            asked = super().act(measurement)
+            measurement.q[:] = measurement.qd[:] = 9.0
+            return asked
+
+    traces = []
+    for name, controller in (("plain", Still((0.5, 0.5))), ("changing", Changing((0.5, 0.5)))):
+        (tmp_path / name).mkdir()
+        loop, link, _ = make_loop(tmp_path / name, controller)
+        loop.run()
+        traces.append([told.torque for told in link.told])
+    assert traces[0] == traces[1]

@@ -51,14 +51,14 @@ def good(index=0, **changes):
 
 def seen(tick, **changes):
     replies = (good(0, taken=tick * PERIOD), good(1, taken=tick * PERIOD))
-    return replace(SupervisorInput(tick * PERIOD, 0.0, replies, (1.0, 2.0)), **changes)
+    return replace(SupervisorInput(tick * PERIOD, 0.0, replies, (0.1, 0.2)), **changes)
 
 
 def running():
     memory, _ = supervise(LIMITS, SupervisorState(), seen(0, operator=Operator.ARM))
     memory, out = supervise(LIMITS, memory, seen(1))
     assert memory.state is State.RUNNING
-    assert out.torque == (1.0, 2.0)
+    assert out.torque == (0.1, 0.2)
     return memory
 
 

@@ -1,6 +1,7 @@
 """An emulated robot on the bench: the client library's commands, time moved by hand."""
 
 import asyncio
+import dataclasses
 import math
 
 import moteus
@@ -11,6 +12,7 @@ from moteus.transport_device import TransportDevice
 from hopping_leg.deploy.frames import Frame, padded
 from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.robot import load_robot
+from hopping_leg.robot.model_mismatch import SensorMismatch
 
 R = moteus.Register
 
@@ -67,11 +69,21 @@ class MemoryTransport(TransportDevice):
         ]
 
 
+def exact(robot):
+    """Return a robot whose sensors have no noise to speak of."""
+    sensor = SensorMismatch(position_noise=1e-15)
+    drives = {
+        name: dataclasses.replace(getattr(robot.reality, name), sensor=sensor)
+        for name in ("hip", "knee")
+    }
+    return dataclasses.replace(robot, reality=dataclasses.replace(robot.reality, **drives))
+
+
 class Bench:
     """Two drives and their leg, asked through the unmodified client."""
 
     def __init__(self, q=(0.6, -1.3), robot="legv2", **options):
-        loaded = load_robot(robot) if isinstance(robot, str) else robot
+        loaded = exact(load_robot(robot) if isinstance(robot, str) else robot)
         self.robot = EmulatedRobot(loaded, np.array(q), **options)
         self.transport = moteus.Transport([MemoryTransport(self.robot)])
         self.drives = [moteus.Controller(id=n, transport=self.transport) for n in (1, 2)]

@@ -3,6 +3,7 @@ import math
 import time
 
 import moteus
+import numpy as np
 import pytest
 from moteus.fdcanusb_device import FdcanusbDevice
 from studies.fault_campaign.emulator_process import EmulatorProcess
@@ -58,8 +59,8 @@ def test_the_client_drives_the_leg_with_checksums(emulator):
     before = emulator.state()
     seen = talk(emulator, push)
     assert [values[moteus.Register.MODE] for values in seen[-1]] == [10, 10]
-    torques = [[round(values[moteus.Register.TORQUE], 6) for values in pair] for pair in seen]
-    assert [0.3, -0.3] in torques
+    torques = np.array([[values[moteus.Register.TORQUE] for values in pair] for pair in seen])
+    np.testing.assert_allclose(np.median(torques[5:], axis=0), [0.3, -0.3], atol=0.06)
     time.sleep(0.1)
     after = emulator.state()
     assert after.time > before.time

@@ -4,7 +4,7 @@ A twin plays the real leg. It is recorded, identified from the recordings, a pol
 scratch on what was identified and hops on the twin without tuning, beside one that was trained on
 the CAD's robot and beside energy shaping. Then the paper's trials judge it in its own simulation,
 beside the shipped policies. A run that was interrupted or killed goes on where it was when the same
-command is called again. Many twins and other ways to train are a study of their own:
+command is called again. Many twins and other ways to identify and train are a study of their own:
 `python -m studies.sim_to_real` in a checkout.
 
 Examples:

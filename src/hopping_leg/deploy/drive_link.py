@@ -70,6 +70,7 @@ class Reply:
         voltage: Bus voltage, V.
         temperature: Drive's electronics, deg C.
         taken: When it was measured, s on the host's clock.
+        ahead: What the drive's clock has gained on the host's, beyond what quartzes do, s.
     """
 
     position: float
@@ -80,6 +81,7 @@ class Reply:
     voltage: float
     temperature: float
     taken: float
+    ahead: float = 0.0
 
 
 Replies = tuple[Reply | None, Reply | None]

@@ -162,13 +162,14 @@ class MotionSequence:
             self.controller.reset(1)
         self._phase = phase
         command = self.command(time)
+        # before the controller acts, which may change what it is given
+        samples = np.concatenate([measurement.q, measurement.qd], axis=2)
         if phase is Part.HOP:
             asked = self.controller.act(measurement)[0]
         else:
             asked = self._hold(phase, lasted, q, qd)
         torque = asked
         if self.limiter is not None:
-            samples = np.concatenate([measurement.q, measurement.qd], axis=2)
             torque = asked + self.limiter.added(asked[None], samples)[0]
         own = _pair(asked) if phase is Part.HOP else (np.nan, np.nan)
         return SequenceStep(_pair(torque), command, phase, own)

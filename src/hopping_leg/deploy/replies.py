@@ -20,6 +20,8 @@ _DRIFT = 2e-4  # Most that two clocks drift apart, s/s: both are quartzes
 _RESTART = -500
 """A counter that falls back further than this, ms, began anew: no reply is held up so long."""
 
+_FIRST = 20  # replies with which a clock is compared
+
 SLACK = 0.0015
 """A reply may seem this much older than its question, s: the counter's step and drift."""
 
@@ -30,6 +32,9 @@ class DriveClock:
     def __init__(self) -> None:
         self._counter: int | None = None
         self._time = self._offset = self._updated = 0.0
+        self._replies, self._least, self._began = 0, math.inf, 0.0
+        self.ahead = 0.0
+        """What the drive's clock has gained, beyond what quartzes do, s."""
 
     def date(self, counter: int, arrived: float) -> float | None:
         """Return when a reply was measured, None if it was seen before; s on the host's clock.
@@ -40,12 +45,17 @@ class DriveClock:
         if self._counter is None or step < _RESTART:
             self._counter, self._time = counter, counter % _WRAP * 1e-3
             self._offset, self._updated = arrived - self._time, arrived
+            self._replies, self._least, self._began, self.ahead = 0, math.inf, arrived, 0.0
             return arrived
         if step == 0:
             return None
         time = self._time + step * 1e-3
         if step > 0:
             self._counter, self._time = counter, time
+        self._replies += 1
+        if self._replies <= _FIRST:  # of which the least held up tells the clocks' difference
+            self._least = min(self._least, arrived - time)
+        self.ahead = self._least - (arrived - time) - _DRIFT * (arrived - self._began)
         allowance = _DRIFT * (arrived - self._updated)
         self._offset, self._updated = min(self._offset + allowance, arrived - time), arrived
         return time + self._offset
@@ -128,4 +138,5 @@ def read_reply(
         float(voltage),
         float(temperature),
         taken,
+        clock.ahead,
     )

@@ -3,7 +3,8 @@
 from dataclasses import dataclass, replace
 
 from hopping_leg.deploy.drive_link import Pair
-from hopping_leg.robot import OVERSPEED, Robot, braking_times
+from hopping_leg.deploy.plausibility import MotorLine
+from hopping_leg.robot import OVERSPEED, Joint, Robot, braking_times
 
 RECORDING_MARGIN = 0.1
 """How far a recorded leg may pass its mechanical range, rad: backlash and the belt's give."""
@@ -29,6 +30,8 @@ class SafetyLimits:
     """Largest torque that leaves, N m."""
     speed: Pair
     """rad/s"""
+    motors: tuple[MotorLine, MotorLine]
+    """What hip's and knee's motors can give."""
     voltage_low: float
     """V"""
     voltage_high: float
@@ -46,6 +49,8 @@ class SafetyLimits:
     drift: float = 0.2
     """What a position may gain over the integral of its velocity within about a second, rad;
     light legs show 0.1 at impacts."""
+    clock: float = 0.005
+    """What a drive's clock may gain on this computer's beyond what quartzes do, s."""
     missing_ticks: int = 3
     """Ticks in a row without a reply that are tolerated: as many as the drives' watchdog lets the
     host miss."""
@@ -92,9 +97,15 @@ def _limits(robot: Robot, rate: float, margin: float, braking: Pair) -> SafetyLi
         braking=(braking[0], braking[1]),
         torque=(hip.torque_limit, knee.torque_limit),
         speed=(OVERSPEED * hip.no_load_speed, OVERSPEED * knee.no_load_speed),
+        motors=(_line(hip), _line(knee)),
         voltage_low=hardware.voltage_low,
         voltage_high=hardware.voltage_high,
         temperature=hardware.temperature_limit,
         period=1 / rate,
         stall=max(hardware.watchdog, 1 / rate),
     )
+
+
+def _line(joint: Joint) -> MotorLine:
+    stall = joint.motor.peak_torque * joint.belt_ratio
+    return MotorLine(joint.torque_limit, stall, joint.no_load_speed, joint.friction)

@@ -1,10 +1,11 @@
 """Why the supervisor changes its state: the reasons, and the checks that find one at a tick."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode, Pair, Replies, Reply
+from hopping_leg.deploy.plausibility import JointEvidence, LagEvidence
 from hopping_leg.deploy.safety_limits import SafetyLimits
 from hopping_leg.robot.parameters import JOINTS
 
@@ -47,6 +48,11 @@ class Reason(IntEnum):
     TORQUE_NOT_FINITE = 27, "The controller asked for a torque that is no number."
     ENCODER_DRIFT = 30, "A position moves away from what its velocity adds up to."
     STANDS_WRONG = 29, "The leg does not stand as its robot's file says."
+    ENCODER_DEAD = 31, "A drive repeats a position that cannot be true: its encoder may be dead."
+    VELOCITY_FALSE = 32, "A drive's velocity is not that of its position."
+    TORQUE_FALSE = 33, "A drive reports another torque than it was told."
+    SAMPLES_STALE = 34, "The drives' samples are older than before."
+    DRIVE_CLOCK = 35, "A drive's clock does not run as this computer's does."
     CONTROLLER_SLOW = 28, "The controller takes longer than a control period has."
 
 
@@ -128,6 +134,8 @@ class Counts:
         overruns: Ticks that began too late, less a part of one for each in time since then.
         late: How late the last of them began, s.
         drift: What positions gained over their velocities lately, rad.
+        evidence: What each drive's replies told lately.
+        lag: How late the torques of both came lately.
     """
 
     last: Replies = (None, None)
@@ -136,17 +144,33 @@ class Counts:
     overruns: float = 0.0
     late: float = 0.0
     drift: Pair = (0.0, 0.0)
+    evidence: tuple[JointEvidence, JointEvidence] = (JointEvidence(), JointEvidence())
+    lag: LagEvidence = field(default_factory=LagEvidence)
 
-    def after(self, limits: SafetyLimits, seen: SupervisorInput) -> "Counts":
-        """Return the counts after a tick."""
+    def after(self, limits: SafetyLimits, seen: SupervisorInput, told: Pair) -> "Counts":
+        """Return the counts after a tick; ``told`` are the torques that left in the last, N m."""
         hip, knee = (self._of_drive(i, limits, reply) for i, reply in enumerate(seen.replies))
         overruns, late = max(self.overruns - _ON_TIME, 0.0), self.late
         if seen.late > limits.period:
             overruns, late = self.overruns + 1, seen.late
         drift = self._drifted(0, limits, hip[0]), self._drifted(1, limits, knee[0])
+        evidence = self._known(0, limits, seen, told), self._known(1, limits, seen, told)
+        fresh_hip, fresh_knee = seen.replies
+        lag = LagEvidence(usual=self.lag.usual)
+        if fresh_hip is not None and fresh_knee is not None:
+            lag = self.lag.after(limits.motors, (fresh_hip, fresh_knee), told)
         return Counts(
-            (hip[0], knee[0]), (hip[1], knee[1]), (hip[2], knee[2]), overruns, late, drift
-        )
+            (hip[0], knee[0]), (hip[1], knee[1]), (hip[2], knee[2]),
+            overruns, late, drift, evidence, lag,
+        )  # fmt: skip
+
+    def _known(
+        self, index: int, limits: SafetyLimits, seen: SupervisorInput, told: Pair
+    ) -> JointEvidence:
+        known, reply = self.evidence[index], seen.replies[index]
+        if reply is None:
+            return known
+        return known.after(limits.motors[index], self.last[index], reply, told[index])
 
     def _drifted(self, index: int, limits: SafetyLimits, reply: Reply | None) -> float:
         """Return a drive's drift with a reply; across a gap or an impact it is unknown."""
@@ -191,11 +215,24 @@ def find_cause(
     for index, joint in enumerate(JOINTS):
         if not abs(now.drift[index]) <= limits.drift:
             return Cause(Reason.ENCODER_DRIFT, f"{joint}: {abs(now.drift[index]):.3g} rad off")
+        evidence = now.evidence[index]
+        for reason, complaint in (
+            (Reason.ENCODER_DEAD, evidence.dead(limits.motors[index])),
+            (Reason.VELOCITY_FALSE, evidence.false_velocity()),
+            (Reason.TORQUE_FALSE, "" if arming else evidence.false_torque()),
+        ):
+            if complaint:
+                return Cause(reason, f"{joint}: {complaint}")
+        reply = seen.replies[index]
+        if reply is not None and not reply.ahead <= limits.clock:
+            return Cause(Reason.DRIVE_CLOCK, f"{joint}: {reply.ahead * 1e3:.1f} ms gained")
         if now.excess[index] > limits.excess_ticks:
             return Cause(Reason.TORQUE_LIMIT, f"{joint}: limit {limits.torque[index]:g} N m")
         if now.missing[index] > limits.missing_ticks:
             late = f"; this computer was {_late_text(now.late)}" if now.overruns else ""
             return Cause(Reason.REPLIES_MISSING, f"{joint}: {now.missing[index]} ticks{late}")
+    if not arming and (stale := now.lag.stale()):
+        return Cause(Reason.SAMPLES_STALE, stale)
     return _of_loop(limits, now, seen)
 
 

@@ -39,6 +39,7 @@ class SupervisorState:
         cause: Why the last transition happened.
         stop_cause: Why ``damping`` was entered last.
         counts: What only several ticks together tell.
+        told: Torques that left last, N m.
     """
 
     state: State = State.DISARMED
@@ -46,6 +47,7 @@ class SupervisorState:
     cause: stop_reasons.Cause = _NOTHING_YET
     stop_cause: stop_reasons.Cause = _NOTHING_YET
     counts: stop_reasons.Counts = _NO_COUNTS
+    told: drive_link.Pair = (0.0, 0.0)
 
 
 def supervise(
@@ -56,14 +58,15 @@ def supervise(
     Returns:
         What to remember and what may leave: always finite and within the limits.
     """
-    counts = before.counts.after(limits, seen)
+    counts = before.counts.after(limits, seen, before.told)
     state, cause = _next(limits, before, counts, seen)
+    outgoing = _outgoing(limits, state, seen)
+    since, stop_cause = before.since, before.stop_cause
     if state is before.state:
-        after = SupervisorState(state, before.since, before.cause, before.stop_cause, counts)
+        cause = before.cause
     else:
-        stop_cause = cause if state is State.DAMPING else before.stop_cause
-        after = SupervisorState(state, seen.time, cause, stop_cause, counts)
-    return after, _outgoing(limits, state, seen)
+        since, stop_cause = seen.time, cause if state is State.DAMPING else stop_cause
+    return SupervisorState(state, since, cause, stop_cause, counts, outgoing.torque), outgoing
 
 
 def _next(

@@ -4,7 +4,7 @@ Time comes as an argument; between two steps nothing changes but the command reg
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from moteus.multiplex import F32
@@ -35,6 +35,10 @@ class Disturbances:
     """Limit notice shown whatever happens."""
     fault: int = 0
     """FaultCode code that comes up as soon as the drive is powered."""
+    clock: float = 1.0
+    """Seconds that its clock counts in one."""
+    report: Callable[[dict[int, float]], dict[int, float]] = lambda registers: registers
+    """What it says of its true registers."""
 
 
 class EmulatedDrive:
@@ -136,7 +140,7 @@ class EmulatedDrive:
         if self._commanded:
             self._commanded = False
             timeout = self.command.timeout or self.settings["servo.default_timeout_s"]
-            self.machine.command(self.command.mode, time, timeout)
+            self.machine.command(self.command.mode, time, timeout / self.disturbances.clock)
 
     def stop(self, time: float) -> None:
         """Stop, as ``d stop`` does."""
@@ -151,7 +155,7 @@ class EmulatedDrive:
 
     def step(self, time: float, dt: float) -> float:
         """Begin one step of physics; return the torque asked of the motor's output, N m, finite."""
-        self.uptime += dt
+        self.uptime += dt * self.disturbances.clock
         self._warmth += dt / _WARMING_TIME * (_HEATING * self._amperes**2 - self._warmth)
         position = self.encoder.position
         outside = position < self._low or position > self._high
@@ -204,6 +208,10 @@ class EmulatedDrive:
         return self.identity.get(register)
 
     def state(self) -> dict[int, float]:
+        """Return what the drive says of how it is, in its units."""
+        return self.disturbances.report(self.true_state())
+
+    def true_state(self) -> dict[int, float]:
         """Return the registers that tell how the drive is, in its units."""
         position = self.encoder.position
         return {

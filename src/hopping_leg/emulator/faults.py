@@ -13,11 +13,13 @@ duration = 0.1
 """
 
 import math
+from collections import deque
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
+from moteus.protocol import Register
 
 from hopping_leg.emulator import reply_queue, settings
 from hopping_leg.errors import UsageError, unknown_name
@@ -25,6 +27,8 @@ from hopping_leg.io import parse_toml, read_dataclass
 from hopping_leg.robot.parameters import JOINTS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from hopping_leg.emulator.drive import EmulatedDrive
     from hopping_leg.emulator.leg import EmulatedLeg
 
@@ -294,6 +298,103 @@ class _OverVoltage(_Disturbance, kind="over_voltage"):
 
 class _UnderVoltage(_OverVoltage, kind="under_voltage"):
     text, value = "the bus voltage sags to", 10.0
+
+
+_SAMPLE = (Register.POSITION, Register.VELOCITY, Register.TORQUE)
+
+
+class _Lie(FaultKind):
+    """A drive whose replies are in time and whole, and not true."""
+
+    def begin(self) -> None:
+        for drive in self.drives:
+            drive.disturbances.report = self.lie(drive)
+
+    def end(self) -> None:
+        for drive in self.drives:
+            drive.disturbances.report = lambda registers: registers
+
+    def lie(self, drive: "EmulatedDrive") -> "Callable[[dict[int, float]], dict[int, float]]":
+        """Return what a drive says of its true registers."""
+        register, factor = self.register, self.fault.amount
+        return lambda true: {**true, register: factor * true[register]}
+
+    register: ClassVar[int] = 0
+    """Which is multiplied with the fault's value."""
+
+
+class _EncoderDead(_Lie, kind="encoder_dead"):
+    text = "a position repeats, its velocity is zero"
+
+    def lie(self, drive: "EmulatedDrive") -> "Callable[[dict[int, float]], dict[int, float]]":
+        said = {Register.POSITION: drive.state()[Register.POSITION], Register.VELOCITY: 0.0}
+        return lambda true: true | said
+
+
+class _SampleFrozen(_Lie, kind="sample_frozen"):
+    text = "position, velocity and torque repeat"
+
+    def lie(self, drive: "EmulatedDrive") -> "Callable[[dict[int, float]], dict[int, float]]":
+        said = {register: drive.state()[register] for register in _SAMPLE}
+        return lambda true: true | said
+
+
+class _VelocityFalse(_Lie, kind="velocity_false"):
+    text, unit, value = "a velocity is this many times the true one", "1", 0.5
+    register = Register.VELOCITY
+
+
+class _TorqueFalse(_Lie, kind="torque_false"):
+    text, unit, value = "a torque is reported as this many times the true one", "1", 0.0
+    register = Register.TORQUE
+
+
+class _StaleSample(_Lie, kind="stale_sample"):
+    text, unit, value = "samples are older than their date says", "s", 0.01
+
+    def begin(self) -> None:
+        self.past = [deque[tuple[float, dict[int, float]]]() for _ in self.drives]
+        super().begin()
+
+    def update(self) -> None:
+        oldest = self.robot.time - self.fault.amount
+        for past, drive in zip(self.past, self.drives, strict=True):
+            past.append((self.robot.time, drive.true_state()))
+            while len(past) > 1 and past[1][0] <= oldest:
+                past.popleft()
+
+    def lie(self, drive: "EmulatedDrive") -> "Callable[[dict[int, float]], dict[int, float]]":
+        past = self.past[self.drives.index(drive)]
+
+        def say(true: dict[int, float]) -> dict[int, float]:
+            return true | {r: past[0][1][r] for r in _SAMPLE} if past else true
+
+        return say
+
+
+class _SwappedReplies(_Lie, kind="swapped_replies"):
+    text = "each drive says what the other one is like"
+
+    def lie(self, drive: "EmulatedDrive") -> "Callable[[dict[int, float]], dict[int, float]]":
+        other = next(one for one in self.robot.drives if one is not drive)
+        return lambda true: other.true_state() | {Register.MULTIPLEX_ID: drive.id}
+
+
+class _SameId(FaultKind, kind="same_id"):
+    text = "a drive takes the other one's CAN id"
+
+    def begin(self) -> None:
+        drive = self.drives[0]
+        other = next(one for one in self.robot.drives if one is not drive)
+        drive.settings.set("id.id", str(other.id))
+
+
+class _FastClock(_Disturbance, kind="fast_clock"):
+    text, unit, value = "a drive's clock counts so many seconds in one", "1", 1.01
+    field = "clock"
+
+    def end(self) -> None:
+        self.disturb(1)
 
 
 class _LimitNotice(_Disturbance, kind="limit_notice"):

@@ -13,11 +13,18 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.deploy.drive_link import joint_transforms
 from hopping_leg.robot import model as robot_model
+from hopping_leg.robot.model_mismatch import SensorMismatch
 from hopping_leg.robot.parameters import Joint, Robot
 from hopping_leg.sim import LegSimulator
 
 TIMESTEP = 5e-4
 """Period of the drives' control, s; the physics steps more often within it."""
+
+_SENSORS = (
+    SensorMismatch(position_noise=1.4e-4, velocity_noise=0.09, torque_noise=0.06),
+    SensorMismatch(position_noise=4e-5, velocity_noise=0.04, torque_noise=0.03),
+)
+"""Of hip and knee where a robot's file says nothing: what leg V2's drives report at rest."""
 
 
 class EmulatedLeg:
@@ -34,7 +41,12 @@ class EmulatedLeg:
         self.wiring = [1.0, 1.0]  # Joint angles as the drives believe them over the true ones
         free = replace(robot, hip=_unlimited(robot.hip), knee=_unlimited(robot.knee))
         immediate = replace(robot.reality.latency, command=0.0, jitter=0.0)
-        free = replace(free, reality=replace(robot.reality, latency=immediate))
+        hip, knee = (
+            replace(drive, sensor=_SENSORS[joint]) if drive.sensor == SensorMismatch() else drive
+            for joint, drive in enumerate((robot.reality.hip, robot.reality.knee))
+        )
+        reality = replace(robot.reality, latency=immediate, hip=hip, knee=knee)
+        free = replace(free, reality=reality)
         self._legs = LegSimulator(
             free, 1, rate=1 / TIMESTEP, timestep=robot_model.TIMESTEP, threads=1
         )

@@ -26,12 +26,13 @@ class Lockstep:
     The lines have checksums, or none as a plain fdcanusb's.
 
     Attributes:
-        truth: Time and base height at every tick, s and m, and the foot's clearance, m.
+        truth: Time, s, base height and the foot's clearance, m, and the angles of hip and knee,
+            rad, at every tick.
     """
 
     def __init__(self, robot: EmulatedRobot, *, checksums: bool = True) -> None:
         self.robot, robot.wire_time = robot, _WIRE_TIME
-        self.truth: list[tuple[float, float, float]] = []
+        self.truth: list[tuple[float, ...]] = []
         self._port = _Pair()
         self.link = MoteusLink(robot.robot, _Host(self, self._port, checksums), self)
 
@@ -44,7 +45,7 @@ class Lockstep:
         while self.robot.time < deadline - 1e-9:
             self.step()
         leg = self.robot.leg
-        self.truth.append((self.robot.time, leg.height, leg.foot_clearance))
+        self.truth.append((self.robot.time, leg.height, leg.foot_clearance, *leg.q.tolist()))
         return max(self.robot.time, deadline)
 
     def wait_readable(self, descriptor: int, until: float) -> bool:

@@ -1,0 +1,201 @@
+"""Whether what the drives say can be true: position, velocity, torque and command together.
+
+Each comparison is one that no healthy leg fails, whatever its mass, friction, play or ground:
+
+- A joint that moved does not come to rest to the last bit within a tick. It does not stay so while
+  the torque on it changes by more than its friction. And a sensor with noise never stays so. A dead
+  encoder, which repeats a position with a velocity of zero, does all three.
+- Over some hundredths of a second, the way of a position is the integral of its velocity.
+- What a motor gives is what it was told, within what it can give at its speed, and always about as
+  late: where the torques of both joints come later than before, samples are old.
+"""
+
+import math
+from dataclasses import dataclass
+
+from hopping_leg.deploy.drive_link import DriveMode, Pair, Reply
+
+_STILL_RADIANS, _STILL_SPEED = 1e-6, 1e-3
+"""Change of a position between two replies, and speed, rad/s, up to which a joint is at rest to the
+last bit; so is one whose velocity repeats as well. A leg that comes to rest gets there slowly: its
+speed is below 3e-3 rad/s before."""
+_MOVED = 0.02  # rad/s, beyond which a joint did move before
+_DEAD = 4  # replies in a row at rest
+_STILL_TORQUE = (0.2, 4.0)  # N m, and times the file's friction: change of torque that moves it
+_NOISY = 20  # replies of which none repeated another, after which a sensor is known to have noise
+
+_FADING = 0.03  # s, within which comparisons of one joint forget
+_IMPACT = 2.0  # Change of speed between two replies beyond which velocities do not tell the way
+_WAY = 8e-4  # rad2, of squared ways that must be known
+_SAME_WAY = 0.6  # least slope of position over velocity's integral, and of that over position
+_PUSH = 2e-3  # of squared torques over the limit squared that must be known
+_GIVEN = 0.3  # least torque reported over torque told
+
+_TICKS = 4  # by which a reported torque may come after the command
+_LATEST = 1  # ticks less one by which a healthy drive's torque comes after the command
+_LAG_FADING = 0.05  # s
+_LAG_CHANGE = 0.01  # of squared changes of torque over the limit squared that must be known
+_LAG_CLEAR = 1.5  # factor by which one lag must explain the torques better than any other
+_LAG_WORSE = 4.0  # factor by which the usual lag must explain them worse
+
+
+@dataclass(frozen=True, slots=True)
+class MotorLine:
+    """What a motor can give, at the joint.
+
+    Attributes:
+        limit: Largest torque that leaves for it, N m.
+        stall: Torque at rest, N m.
+        no_load_speed: Speed at which it has none left, rad/s.
+        friction: Of the joint, N m.
+    """
+
+    limit: float
+    stall: float
+    no_load_speed: float
+    friction: float
+
+    def share(self, torque: float, velocity: float) -> float:
+        """Return what the motor gives of a torque, N m, at a speed, rad/s, over its limit."""
+        drop = self.stall * velocity / self.no_load_speed
+        high = min(max(self.stall - drop, 0.0), self.limit)
+        low = max(min(-self.stall - drop, 0.0), -self.limit)
+        return max(low, min(high, torque)) / self.limit
+
+
+@dataclass(frozen=True, slots=True)
+class JointEvidence:
+    """What the replies of one drive told lately.
+
+    Attributes:
+        replies: How many there were since the drive was powered.
+        still: Of them in a row at rest to the last bit, until now.
+        stillest: Most of them that were so before.
+        speed_before: Speed before them, rad/s.
+        torques: Lowest and highest torque that was told meanwhile, N m.
+        ways: Sums of the squared integral of velocity, of its product with the position's way, and
+            of that way squared, rad2, fading.
+        newer, older: Sums of the squared torque that was told one tick, two ticks before, and of
+            its product with the reported torque, over the limit squared, fading.
+        told: Torque that was told in the tick before, N m.
+    """
+
+    replies: int = 0
+    still: int = 0
+    stillest: int = 0
+    speed_before: float = 0.0
+    torques: Pair = (0.0, 0.0)
+    ways: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    newer: Pair = (0.0, 0.0)
+    older: Pair = (0.0, 0.0)
+    told: float = 0.0
+
+    def after(
+        self, motor: MotorLine, last: Reply | None, reply: Reply, told: float
+    ) -> "JointEvidence":
+        """Return the evidence with a reply; ``told`` is the torque in force since the last, N m."""
+        if last is None or reply.mode != DriveMode.POSITION:  # else a leg may be held, or stand
+            return JointEvidence(told=told)
+        elapsed, way = reply.taken - last.taken, reply.position - last.position
+        still, stillest, before, torques = 0, max(self.stillest, self.still), 0.0, (told, told)
+        repeats = abs(reply.velocity) <= _STILL_SPEED or reply.velocity == last.velocity
+        if abs(way) <= _STILL_RADIANS and repeats:
+            still, stillest, before = self.still + 1, self.stillest, abs(last.velocity)
+            if self.still:
+                before = self.speed_before
+                torques = min(self.torques[0], told), max(self.torques[1], told)
+        ways, newer, older = (0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0)
+        if 0 < elapsed < _FADING:
+            fading = math.exp(-elapsed / _FADING)
+            vv, vw, ww = (fading * value for value in self.ways)
+            if abs(reply.velocity - last.velocity) <= _IMPACT:
+                integral = elapsed * (last.velocity + reply.velocity) / 2
+                vv, vw, ww = vv + integral * integral, vw + integral * way, ww + way * way
+            ways, given = (vv, vw, ww), reply.torque / motor.limit
+            newer = _summed(self.newer, fading, motor.share(told, reply.velocity), given)
+            older = _summed(self.older, fading, motor.share(self.told, reply.velocity), given)
+        return JointEvidence(
+            self.replies + 1, still, stillest, before, torques, ways, newer, older, told
+        )
+
+    def dead(self, motor: MotorLine) -> str:
+        """Return why the encoder must be dead, "" if it need not."""
+        if self.still < _DEAD:
+            return ""
+        if self.speed_before > _MOVED:
+            return f"at rest to the last bit after {self.speed_before:.2g} rad/s"
+        if self.stillest == 0 and self.replies - self.still > _NOISY:
+            return f"{self.still} times the same where no reading repeated another before"
+        least, times = _STILL_TORQUE
+        change = self.torques[1] - self.torques[0]
+        if change > least + times * motor.friction:
+            return f"at rest to the last bit while its torque changed by {change:.2g} N m"
+        return ""
+
+    def false_velocity(self) -> str:
+        """Return how velocity and position contradict each other, "" if they do not."""
+        vv, vw, ww = self.ways
+        if vv + ww < _WAY or vw >= _SAME_WAY * max(vv, ww):
+            return ""
+        return f"it moved by {vw / max(vv, 1e-12):.2g} of what its velocity adds up to"
+
+    def false_torque(self) -> str:
+        """Return how reported and told torque contradict each other, "" if they do not."""
+        if min(self.newer[0], self.older[0]) < _PUSH:
+            return ""
+        newer, older = (product / square for square, product in (self.newer, self.older))
+        return "" if max(newer, older) >= _GIVEN else f"it reports {newer:.0%} of what it was told"
+
+
+def _summed(sums: Pair, fading: float, told: float, given: float) -> Pair:
+    return fading * sums[0] + told * told, fading * sums[1] + told * given
+
+
+@dataclass(frozen=True, slots=True)
+class LagEvidence:
+    """How late the drives' torques come after the commands, both joints together.
+
+    Attributes:
+        told: Torques that were told in the last ticks, the newest first, N m.
+        errors: Sums of the squared difference of reported torques from those told 1, 2, 3 and 4
+            ticks before, over the limits squared, fading.
+        changes: Sum of squared changes of the torques told, likewise.
+        usual: Least lag that ever explained the torques clearly best, ticks less one.
+    """
+
+    told: tuple[Pair, ...] = ()
+    errors: tuple[float, ...] = (0.0,) * _TICKS
+    changes: float = 0.0
+    usual: int = _TICKS
+
+    def after(
+        self, motors: tuple[MotorLine, MotorLine], replies: tuple[Reply, Reply], told: Pair
+    ) -> "LagEvidence":
+        """Return the evidence with fresh replies of both drives, a tick after the last ones."""
+        past = (told, *self.told)[:_TICKS]
+        if len(past) < _TICKS:
+            return LagEvidence(past)
+        elapsed = _FADING / 6  # a tick
+        fading = math.exp(-elapsed / _LAG_FADING)
+        errors, changes = [fading * error for error in self.errors], fading * self.changes
+        for joint, (motor, reply) in enumerate(zip(motors, replies, strict=True)):
+            shares = [motor.share(pair[joint], reply.velocity) for pair in past]
+            given = reply.torque / motor.limit
+            for lag, share in enumerate(shares):
+                errors[lag] += (given - share) * (given - share)  # an overflow is infinite
+            changes += (shares[0] - shares[1]) * (shares[0] - shares[1])
+        best, second = sorted(errors)[:2]
+        clear = changes > _LAG_CHANGE and second > _LAG_CLEAR * best + 1e-6
+        usual = min(self.usual, errors.index(best)) if clear else self.usual
+        return LagEvidence(past, tuple(errors), changes, usual)
+
+    def stale(self) -> str:
+        """Return by how much the samples are older than before, "" if they are not."""
+        if self.usual == _TICKS or self.changes < _LAG_CHANGE:
+            return ""
+        if self.usual > _LATEST:
+            return f"torques come {self.usual + 1} ticks after their commands"
+        best = min(self.errors)
+        later = self.errors.index(best) - self.usual
+        worse = self.errors[self.usual] > _LAG_WORSE * best + _LAG_CHANGE
+        return f"torques come {later} ticks later" if later > 0 and worse else ""
