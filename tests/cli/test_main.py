@@ -20,6 +20,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg import cli
+from hopping_leg.cli import identify as cli_identify
 from hopping_leg.cli import main
 from hopping_leg.cli.options import (
     Heights,
@@ -30,6 +31,7 @@ from hopping_leg.cli.options import (
     show_table,
 )
 from hopping_leg.errors import UsageError
+from hopping_leg.identify.optimizers import SearchOptions
 from hopping_leg.progress import LiveProgress, ShareProgress
 from hopping_leg.robot import load_robot, load_tree, numbers, shipped_robots
 
@@ -62,6 +64,22 @@ def test_help_is_quick_and_loads_no_simulator():
     start = time.perf_counter()
     assert subprocess.run([sys.executable, "-c", code], capture_output=True).returncode == 0
     assert time.perf_counter() - start < 5
+
+
+LATE = {"numba", "scipy", "matplotlib", "torch", "onnxruntime", "polars"}
+
+
+def test_help_of_a_verb_loads_nothing_heavy():
+    quick = [verb for verb in cli.VERBS if verb not in ("deploy", "record", "export")]
+    imports = "; ".join(f"import hopping_leg.cli.{verb}" for verb in quick)
+    code = f"import sys; {imports}; print(*({LATE} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout == "\n", done.stdout + done.stderr
+
+
+def test_help_names_the_effort_that_a_fit_takes():
+    asked, default = cli_identify.Identify((Path("run.csv"),)), SearchOptions()
+    assert (asked.generations, asked.population) == (default.generations, default.population)
 
 
 @pytest.mark.parametrize(

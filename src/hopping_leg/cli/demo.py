@@ -11,7 +11,6 @@ Examples:
 from dataclasses import dataclass
 
 from hopping_leg.cli import view
-from hopping_leg.controllers.registry import ENERGY_SHAPING
 
 BEST = "universal"
 """The shipped policy that hops on any leg, changed ones included."""
@@ -31,5 +30,7 @@ class Demo:
 
 def run(args: Demo) -> None:
     """Serve the page until Ctrl-C."""
+    from hopping_leg.controllers.registry import ENERGY_SHAPING
+
     shown = (BEST, ENERGY_SHAPING)
     view.run(view.View(shown, None, port=args.port, browser=args.browser, seconds=args.seconds))

@@ -71,7 +71,11 @@ def run(args: Deploy) -> None:
     options.say(
         *done.notices,
         *(event["fallback"] for event in events if "fallback" in event),
-        *(_squatted(event["squat"]["upward"]) for event in events if "squat" in event),
+        *(
+            f"In its squat the leg carried {event['squat']['upward']:.0%} of its file's weight."
+            for event in events
+            if "squat" in event
+        ),
         f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out.",
     )
     options.say_written(done.path)
@@ -84,19 +88,13 @@ def run(args: Deploy) -> None:
         raise TraceError(done.complaint)
 
 
-def _squatted(upward: float) -> str:
-    return f"In its squat the leg carried {upward:.0%} of its file's weight."
-
-
 def _emulated(args: Deploy, cause: stop_reasons.Cause) -> str:
     """Return where to look if drives did not answer that run on this computer."""
     silent = (stop_reasons.Reason.REPLIES_MISSING, stop_reasons.Reason.DRIVE_TIMEOUT)
     terminal = Path(args.transport).resolve().is_relative_to("/dev/pts")
-    return (
-        "If this computer was late, `hop emulate` says by how much."
-        if terminal and cause.reason in silent
-        else ""
-    )
+    if terminal and cause.reason in silent:
+        return "If this computer was late, `hop emulate` says by how much."
+    return ""
 
 
 def _plan(

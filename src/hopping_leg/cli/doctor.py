@@ -15,18 +15,12 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 from typing import TYPE_CHECKING
 
-import numpy as np
 from packaging.requirements import Requirement
 
 from hopping_leg.cli import motors, options
 from hopping_leg.deploy import preflight, safety_limits
-from hopping_leg.envs import HoppingEnv
 from hopping_leg.errors import HardwareError, UsageError
-from hopping_leg.identify.simulate import compile_replay
-from hopping_leg.robot import DEFAULT_ROBOT, JOINTS, Robot, load_robot
-from hopping_leg.sim import CONTROL_RATE, compile_physics
-from hopping_leg.sim.compiled import FOLDER
-from hopping_leg.sim.mujoco_simulator import MujocoSimulator
+from hopping_leg.robot import CONTROL_RATE, DEFAULT_ROBOT, JOINTS, Robot, load_robot
 
 if TYPE_CHECKING:
     from hopping_leg.deploy.moteus_link import MoteusLink
@@ -70,6 +64,8 @@ def run(args: Doctor) -> None:
             options.say(f"{extra}: {state}; {PURPOSES[extra]}")
             if missing:
                 options.say(f"  pip install 'hopping-leg[{extra}]'")
+        from hopping_leg.sim.compiled import FOLDER
+
         compile_everything()
         options.say(
             f"compiled code: {FOLDER or 'no folder can be written; lost with each process'}"
@@ -82,7 +78,12 @@ def run(args: Doctor) -> None:
         if args.write:
             _write(link, robot, findings, yes=args.yes)
         if args.home is not None:
-            _home(link, args.home, yes=args.yes)
+            from hopping_leg.deploy.drive_info import home
+
+            hip, knee = args.home
+            told = f"The drives will take the hip for {hip:g} and the knee for {knee:g} rad."
+            motors.ask(told, yes=args.yes)
+            home(link, args.home)
         if changes:
             findings = motors.find(link, robot, limits)
     motors.show(findings)
@@ -93,6 +94,13 @@ def run(args: Doctor) -> None:
 
 def compile_everything() -> None:
     """Compile what simulation, environment and identification need, or load it."""
+    import numpy as np
+
+    from hopping_leg.envs import HoppingEnv
+    from hopping_leg.identify.simulate import compile_replay
+    from hopping_leg.sim import compile_physics
+    from hopping_leg.sim.mujoco_simulator import MujocoSimulator
+
     robot = load_robot(DEFAULT_ROBOT)
     compile_physics()
     compile_replay()
@@ -114,14 +122,6 @@ def _write(
             options.say(*(f"{name}: {s.name} = {s.text} ({s.why})" for s in settings))
             motors.ask(f"These settings of the {name}'s drive will be written for good.", yes=yes)
             configure(link, joint, settings)
-
-
-def _home(link: "MoteusLink", angles: tuple[float, float], *, yes: bool) -> None:
-    from hopping_leg.deploy.drive_info import home
-
-    hip, knee = angles
-    motors.ask(f"The drives will take the hip for {hip:g} and the knee for {knee:g} rad.", yes=yes)
-    home(link, angles)
 
 
 def missing_requirements(requirements: Sequence[str]) -> dict[str, list[str]]:

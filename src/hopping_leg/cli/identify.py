@@ -14,25 +14,18 @@ Examples:
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import tyro
 from rich.table import Column
 
 from hopping_leg import errors, io
-from hopping_leg.cli.options import (
-    JsonFile,
-    command_line,
-    save_json,
-    say,
-    say_next,
-    show_table,
-)
-from hopping_leg.identify import plan, recording, result
-from hopping_leg.identify.optimizers import SearchOptions
-from hopping_leg.identify.pipeline import IdentifyOptions, identify
-from hopping_leg.identify.report import write_fit_report
+from hopping_leg.cli.options import JsonFile, command_line, save_json, say, say_next, show_table
 from hopping_leg.progress import LiveProgress, said_if_slow
 from hopping_leg.robot import JOINTS, load_robot
+
+if TYPE_CHECKING:
+    from hopping_leg.identify.result import Identified
 
 _FILES = {"out": "Robot", "json": "Numbers", "report": "Report"}
 
@@ -63,9 +56,9 @@ class Identify:
     """Bounds in SI units, e.g. `--bounds hip.friction=0,0.5 drive.delay=0,0.01`."""
     starts: int = 1
     """Searches from different starts; the best one counts."""
-    generations: int = SearchOptions().generations
+    generations: int = 100
     """Generations of CMA-ES, in each pass."""
-    population: int = SearchOptions().population
+    population: int = 16
     """Candidates in a generation of CMA-ES."""
     posterior: int = 0
     """Draws of all parameters that the recordings allow, for --json; 0 writes none."""
@@ -88,6 +81,11 @@ class FitProgress(LiveProgress):
 
 def run(args: Identify) -> None:
     """Identify a leg."""
+    from hopping_leg.identify import plan, recording, result
+    from hopping_leg.identify.optimizers import SearchOptions
+    from hopping_leg.identify.pipeline import IdentifyOptions, identify
+    from hopping_leg.identify.report import write_fit_report
+
     effort = SearchOptions(args.starts, generations=args.generations, population=args.population)
     options = IdentifyOptions(
         parameters=args.parameters,
@@ -155,12 +153,12 @@ def _bounds(text: str) -> tuple[str, tuple[float, float]]:
 
 def _check_outputs(args: Identify, origin: str, outputs: list[tuple[str, Path]]) -> None:
     """Refuse an output that would replace an input, before any time is spent."""
+    from hopping_leg.identify.recording import sidecar_path
+
     if args.out.suffix != ".toml":
         raise errors.UsageError(f"--out {args.out} must end in .toml, as robot files do.")
     recordings = (*args.recordings, *args.validate)
-    inputs = {
-        p.resolve() for p in (Path(origin), *recordings, *map(recording.sidecar_path, recordings))
-    }
+    inputs = {p.resolve() for p in (Path(origin), *recordings, *map(sidecar_path, recordings))}
     for name, path in outputs:
         if path.resolve() in inputs:
             raise errors.UsageError(f"--{name} {path} would replace an input; give another file.")
@@ -168,7 +166,9 @@ def _check_outputs(args: Identify, origin: str, outputs: list[tuple[str, Path]])
             raise errors.UsageError(f"--{name} {path} is a folder; give a file.")
 
 
-def _show(identified: result.Identified) -> None:
+def _show(identified: "Identified") -> None:
+    from hopping_leg.identify import result
+
     rows = []
     for row in result.parameters_json(identified):
         value = f"{row['value']:.4g}{' (at bound)' if row['at_bound'] else ''}"

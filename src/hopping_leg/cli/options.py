@@ -104,11 +104,6 @@ def say_written(*paths: Path | None) -> None:
     say(*(f"Wrote {path}" for path in paths if path))
 
 
-def robot_words(robot: str | None) -> list[str]:
-    """Return the words that name a robot, none for the default."""
-    return [] if robot is None else ["--robot", robot]
-
-
 def say_next(*commands: Iterable[object]) -> None:
     """Say what may come next: commands that the shell reads and that work as they stand."""
     say("Next:", *(f"  {shlex.join(map(str, words))}" for words in commands))

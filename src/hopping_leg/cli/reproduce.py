@@ -18,26 +18,17 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from hopping_leg import io
-from hopping_leg.cli import evaluate, options
-from hopping_leg.cli.identify import FitProgress
-from hopping_leg.controllers import RolloutConfig
-from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller, shipped_policies
+from hopping_leg.cli import options
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import EvaluationRun, runner, tables
-from hopping_leg.evaluate.entries import entry_of
-from hopping_leg.evaluate.report import write_report
-from hopping_leg.identify import excitation, paper_excitation, play_excitation
-from hopping_leg.identify.optimizers import SearchOptions
-from hopping_leg.identify.pipeline import IdentifyOptions, identify
-from hopping_leg.identify.recording import Recording, load_recording
-from hopping_leg.identify.result import save_robot
-from hopping_leg.locks import hold_folder
 from hopping_leg.progress import ShareProgress
 from hopping_leg.robot import Robot, load_robot, parent_robot
-from hopping_leg.sim import NO_NOISE, NoiseAndDelay
-from hopping_leg.sim.randomization import draw_twin
+
+if TYPE_CHECKING:
+    from hopping_leg.evaluate import EvaluationRun
+    from hopping_leg.identify.recording import Recording
 
 COMMANDS = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)
 """Apex heights at which the twin is tried, m."""
@@ -78,6 +69,12 @@ class Reproduce:
 
 def run(args: Reproduce) -> None:
     """Record, identify, train, hop on the twin, evaluate, report."""
+    from hopping_leg.cli import evaluate
+    from hopping_leg.controllers.registry import ENERGY_SHAPING, shipped_policies
+    from hopping_leg.evaluate import tables
+    from hopping_leg.evaluate.report import write_report
+    from hopping_leg.locks import hold_folder
+
     start, folder = time.monotonic(), args.folder
     notes = [NOTHING_MEANT] if args.quick else []
     options.at_least(0, seed=args.seed)
@@ -125,6 +122,8 @@ def run(args: Reproduce) -> None:
 
 def _twin(args: Reproduce) -> tuple[Robot, str]:
     """Return the leg that plays the real one, and what is believed of it: a name or file."""
+    from hopping_leg.sim.randomization import draw_twin
+
     if args.twin is None:
         drawn = draw_twin(0)
         return drawn.robot, str(drawn.tree["extends"])
@@ -147,8 +146,11 @@ def _check_same(args: Reproduce) -> None:
     io.write_json(file, asked)
 
 
-def _record(twin: Robot, believed: str, folder: Path) -> Iterator[Recording]:
+def _record(twin: Robot, believed: str, folder: Path) -> "Iterator[Recording]":
     """Play the paper's trajectories on the twin, clamped and on the rail; yield the recordings."""
+    from hopping_leg.identify import excitation, paper_excitation, play_excitation
+    from hopping_leg.identify.recording import load_recording
+
     templates = (
         ("fixed-base", paper_excitation.fixed_base(swings=(10.0,), duration=_RECORDED)),
         ("rail", paper_excitation.moving_base(duration=_RECORDED)),
@@ -162,8 +164,13 @@ def _record(twin: Robot, believed: str, folder: Path) -> Iterator[Recording]:
         yield load_recording(file)
 
 
-def _identify(recordings: list[Recording], believed: str, folder: Path, *, quick: bool) -> str:
+def _identify(recordings: "list[Recording]", believed: str, folder: Path, *, quick: bool) -> str:
     """Fit the believed robot to the recordings; return the identified robot's file."""
+    from hopping_leg.cli.identify import FitProgress
+    from hopping_leg.identify.optimizers import SearchOptions
+    from hopping_leg.identify.pipeline import IdentifyOptions, identify
+    from hopping_leg.identify.result import save_robot
+
     file = folder / "identified.toml"
     if file.exists():
         return str(file)
@@ -195,8 +202,14 @@ def _train(source: str, args: Reproduce) -> Path:
 
 def _hop(
     twin: Robot, believed: str, policies: dict[str, tuple[Path, str]], args: Reproduce
-) -> EvaluationRun:
+) -> "EvaluationRun":
     """Let policies, told the robots of their trainings, and energy shaping hop on the twin."""
+    from hopping_leg.controllers import RolloutConfig
+    from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller
+    from hopping_leg.evaluate import runner
+    from hopping_leg.evaluate.entries import entry_of
+    from hopping_leg.sim import NO_NOISE, NoiseAndDelay
+
     told: dict[str, tuple[str | Path, str]] = {**policies}
     told[ENERGY_SHAPING] = ENERGY_SHAPING, believed
     entries = [

@@ -17,14 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from hopping_leg.cli.options import (
-    JsonFile,
-    at_least,
-    going_on,
-    robot_words,
-    save_json,
-    say_next,
-)
+from hopping_leg.cli.options import JsonFile, at_least, going_on, save_json, say_next
 from hopping_leg.progress import said_if_slow
 from hopping_leg.robot import load_robot
 
@@ -107,7 +100,7 @@ def run(args: Options) -> None:
         )
     print(trained.policy.with_name("model_card.md").read_text(encoding="utf-8"))
     print(f"Policy: {trained.policy}")
-    on_robot = robot_words(args.robot)
+    on_robot = [] if args.robot is None else ["--robot", args.robot]
     say_next(
         ["hop", "evaluate", trained.policy, *on_robot, "--out", out / "evaluation"],
         ["hop", "view", trained.policy, *on_robot],
