@@ -19,10 +19,10 @@ from hopping_leg import envs
 from hopping_leg.arrays import Array, Array32
 from hopping_leg.rl.distillation.dagger import Dagger, cosine
 from hopping_leg.rl.distillation.students import WindowStudent
-from hopping_leg.rl.onnx_export import Network
+from hopping_leg.rl.onnx_export import Actor, DenseActor
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.sb3_env import TaskVecEnv
-from hopping_leg.rl.sb3_policies import dense, dense_network
+from hopping_leg.rl.sb3_policies import dense
 from hopping_leg.robot import Robot
 from hopping_leg.sim import LegSimulator
 
@@ -168,7 +168,7 @@ def learn_teacher(
     return lambda task: LearntTeacher(model.policy, task)
 
 
-def refine(dagger: Dagger, recipe: Recipe, robot: Robot, seed: int, steps: int) -> Network:
+def refine(dagger: Dagger, recipe: Recipe, robot: Robot, seed: int, steps: int) -> Actor:
     """Go on from a distilled student by PPO; return the actor."""
     student = dagger.student
     assert isinstance(student, WindowStudent), "only dense students are refined"
@@ -180,4 +180,4 @@ def refine(dagger: Dagger, recipe: Recipe, robot: Robot, seed: int, steps: int) 
         own.load_state_dict(given.state_dict())
     env.task.reward.anneal(1.0)
     _learn(model, env, steps, (_LOG_STD[1], _LOG_STD[1]))
-    return dense_network(layers, env.task.observation, "clip")
+    return DenseActor(*layers)

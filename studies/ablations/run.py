@@ -14,9 +14,10 @@ import torch
 
 from hopping_leg.cli.options import JsonFile, RobotFile, at_least, mm, show_table
 from hopping_leg.controllers.policy import Card
+from hopping_leg.envs.observation import make_observation
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.runner import software_versions
-from hopping_leg.rl.onnx_export import Network, build_policy
+from hopping_leg.rl.onnx_export import Actor, build_policy
 from hopping_leg.rl.policy_evaluation import calibrate
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes.fast import FAST
@@ -26,7 +27,7 @@ from studies.ablations import ppo
 from studies.shared import Row, once
 from studies.time_to_accuracy.run import JUDGING_SEEDS, judge
 
-Train = Callable[[Recipe, Robot, int], Network]
+Train = Callable[[Recipe, Robot, int], Actor]
 
 
 def _learn(learner: Any, recipe: Recipe) -> Any:  # noqa: ANN401
@@ -34,22 +35,22 @@ def _learn(learner: Any, recipe: Recipe) -> Any:  # noqa: ANN401
     return learner
 
 
-def distilled(recipe: Recipe, robot: Robot, seed: int) -> Network:
+def distilled(recipe: Recipe, robot: Robot, seed: int) -> Actor:
     """Return the student of a distillation."""
-    network: Network = _learn(recipe.make_learner(robot, seed), recipe).network()
+    network: Actor = _learn(recipe.make_learner(robot, seed), recipe).network()
     return network
 
 
-def taught_by_ppo(recipe: Recipe, robot: Robot, seed: int) -> Network:
+def taught_by_ppo(recipe: Recipe, robot: Robot, seed: int) -> Actor:
     """Return a student whose teacher has learnt by PPO for five times the student's steps."""
     make = ppo.learn_teacher(recipe, robot, seed, 5 * recipe.schedule.steps)
     learner: Any = recipe.make_learner(robot, seed)
     learner.teacher = make(learner.task)
-    network: Network = _learn(learner, recipe).network()
+    network: Actor = _learn(learner, recipe).network()
     return network
 
 
-def refined(recipe: Recipe, robot: Robot, seed: int) -> Network:
+def refined(recipe: Recipe, robot: Robot, seed: int) -> Actor:
     """Return a student that goes on by PPO for half as many steps again."""
     learner = _learn(recipe.make_learner(robot, seed), recipe)
     return ppo.refine(learner, recipe, robot, seed, recipe.schedule.steps // 2)
@@ -144,9 +145,11 @@ def judged(recipe: Recipe, robot: Robot, seed: int, train: Train) -> Row:
         recipe.name, recipe.task.observation, low, high, recipe.task.action_torque, robot.name,
         robot.digest, recipe.task.rate, seed,
     )  # fmt: skip
-    content = build_policy(network, card)
-    if rounds := recipe.selection.calibrations:
-        content = calibrate(content, robot, (low, high), rounds, recipe.task.rate)
+    seen = make_observation(robot, recipe.task, 1)
+    content = build_policy(network, seen, card)
+    rounds = recipe.selection.calibrations
+    if rounds:
+        content = calibrate(content, robot, rounds)
     return judge(content, robot)
 
 

@@ -38,7 +38,7 @@ def tiny(monkeypatch):
 
 
 def weights(network):
-    return [np.concatenate([w.ravel(), b]) for w, b in network.layers]
+    return [p.detach().numpy().copy() for p in network.parameters()]
 
 
 def test_variants_differ_from_the_recipe_and_from_each_other_in_what_they_name():

@@ -12,8 +12,7 @@ from stable_baselines3.common.env_util import make_vec_env
 from hopping_leg.controllers.policy import Card
 from hopping_leg.envs import TaskConfig
 from hopping_leg.envs.observation import make_observation
-from hopping_leg.rl.onnx_export import build_policy
-from hopping_leg.rl.sb3_policies import dense_network
+from hopping_leg.rl.onnx_export import DenseActor, build_policy
 from hopping_leg.robot import Robot
 
 ALGORITHMS = {"sb3-ppo": (PPO, 8), "sb3-sac": (SAC, 1)}
@@ -64,13 +63,12 @@ def policy_file(model: BaseAlgorithm, name: str, robot: Robot, seed: int) -> byt
     """Return the policy file of a model trained on the environment's own defaults."""
     task = TaskConfig()
     if isinstance(model, SAC):
-        parts, squash = [model.actor.latent_pi, model.actor.mu], "tanh"
+        actor = DenseActor(model.actor.latent_pi, model.actor.mu, torch.nn.Tanh())
     else:
-        parts, squash = [model.policy.mlp_extractor.policy_net, model.policy.action_net], "clip"
-    network = dense_network(parts, make_observation(robot, task, 1), squash)
+        actor = DenseActor(model.policy.mlp_extractor.policy_net, model.policy.action_net)
     low, high = task.command_bounds
     card = Card(
         name, task.observation, low, high, task.action_torque, robot.name, robot.digest, task.rate,
         seed=seed, steps=int(model.num_timesteps),
     )  # fmt: skip
-    return build_policy(network, card)
+    return build_policy(actor, make_observation(robot, task, 1), card)

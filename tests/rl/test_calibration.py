@@ -11,7 +11,7 @@ from hopping_leg.sim.channel import Measurement
 from tests.rl.learners import ROBOT
 from tests.rl.test_onnx_export import shown
 
-HEIGHTS = np.linspace(0.22, 0.40, 19)
+HEIGHTS = np.linspace(0.20, 0.40, 21)
 USUAL = CommandResult(0.3, 0.0, 0.002, 20, 2.0, 0.5, 0, 0, 0.1)
 
 
@@ -37,7 +37,7 @@ def calibrated(monkeypatch, hop, rounds=3):
         ]
 
     monkeypatch.setattr(policy_evaluation, "evaluate_policy", evaluate_policy)
-    content = calibrate(shown("three-samples"), ROBOT, (0.22, 0.40), rounds, 200.0)
+    content = calibrate(shown("three-samples"), ROBOT, rounds)
     assert seeds == list(CALIBRATION_SEEDS[:rounds])
     return told(policy_evaluation.Policy(content, "here", "test"), HEIGHTS) - HEIGHTS
 
@@ -49,7 +49,7 @@ def test_hops_that_are_off_by_what_depends_on_the_height_meet_their_commands(mon
     shifts = calibrated(monkeypatch, hop)
     aims = HEIGHTS + shifts
     assert np.abs(hop(HEIGHTS, 0) - HEIGHTS).max() > 0.008
-    assert np.abs(hop(aims, 0) - HEIGHTS).max() < 2e-4
+    assert np.abs(hop(aims, 0) - HEIGHTS).max() < 3e-4
 
 
 def test_rounds_take_the_mean_of_what_is_due_to_chance(monkeypatch):

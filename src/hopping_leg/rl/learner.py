@@ -8,8 +8,9 @@ import numpy as np
 from stable_baselines3.common.logger import Logger
 
 from hopping_leg.arrays import Array
+from hopping_leg.envs.observation import Observation
 from hopping_leg.rl.checkpoint import Tree
-from hopping_leg.rl.onnx_export import Network
+from hopping_leg.rl.onnx_export import Actor
 
 
 class RecentHops:
@@ -47,6 +48,7 @@ class Learner(Protocol):
 
     Attributes:
         num_timesteps: Control steps of experience so far.
+        observation: What makes its observations.
         recent_hops: The latest hops.
         seconds: Time spent on each part.
         share: Share of the training that is done, 0 to 1.
@@ -60,6 +62,9 @@ class Learner(Protocol):
     seconds: dict[str, float]
     on_boundary: Callable[[], None] | None
     remaining: Callable[[], float] | None
+
+    @property
+    def observation(self) -> Observation: ...  # noqa: D102
 
     @property
     def recent_hops(self) -> RecentHops: ...  # noqa: D102
@@ -76,7 +81,7 @@ class Learner(Protocol):
         """Learn until so many control steps are done in all, or until the callback says no."""
         ...
 
-    def network(self) -> Network:
+    def network(self) -> Actor:
         """Return the deterministic actor as it stands."""
         ...
 

@@ -4,18 +4,16 @@ The seeds here select; they must never be among those that judge (1000 and above
 """
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from hopping_leg.arrays import Array
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.controllers.rollout import Rollout, RolloutConfig, rollout
 from hopping_leg.hop_detection import HopMeasurement, measure_hops
-from hopping_leg.rl.onnx_export import CommandMap, with_command_map
+from hopping_leg.rl.onnx_export import every_centimetre, with_shifts
 from hopping_leg.robot.parameters import JOINTS, Robot
 
 FIRST_SEED = 500
@@ -26,9 +24,6 @@ FINAL_SEEDS = (501, 502, 503, 504)
 
 CALIBRATION_SEEDS = (505, 506, 507, 508)
 """By whose hops a policy's command is corrected."""
-
-_SPACING = 0.01
-"""Spacing of heights at which nothing between two others should be missed, m."""
 
 _RANGE_SECONDS = 10.0
 """Of the trials that tell a policy's range of inputs."""
@@ -113,12 +108,6 @@ def input_range(
     return tuple(float(c.min()) for c in columns), tuple(float(c.max()) for c in columns)
 
 
-def every_centimetre(commands: Sequence[float]) -> tuple[float, ...]:
-    """Return heights from the lowest to the highest command, about 1 cm apart, m."""
-    low, high = min(commands), max(commands)
-    return tuple(map(float, np.linspace(low, high, round((high - low) / _SPACING) + 1)))
-
-
 def score(results: list[CommandResult]) -> float:
     """Return how bad a policy is, m.
 
@@ -182,35 +171,19 @@ _TRUSTED = 0.01
 """Error of which a round corrects no more, m."""
 
 
-def calibrate(
-    content: bytes,
-    robot: Robot,
-    command_range: tuple[float, float],
-    rounds: int,
-    rate: float,
-) -> bytes:
+def calibrate(content: bytes, robot: Robot, rounds: int) -> bytes:
     """Return a policy file with the command map with which it meets its commands.
 
     Round k, on a seed of its own, corrects the k-th part of the remaining error: the mean of what
-    the rounds tell. Heights without hops keep their shift.
-
-    Args:
-        content: The policy file.
-        robot: The leg.
-        command_range: Lowest and highest command, m.
-        rounds: How many, at most one per calibration seed.
-        rate: Control rate, Hz.
+    the rounds tell, at most one per calibration seed. Heights without hops keep their shift.
     """
-    heights = every_centimetre(command_range)
+    card = Policy(content, "calibration", "policy").card
+    heights = every_centimetre((card.command_low, card.command_high))
     shifts = np.zeros(len(heights))
     for number, seed in enumerate(CALIBRATION_SEEDS[:rounds], start=1):
-        policy = Policy(_mapped(content, heights, shifts), "calibration", "policy")
-        results = evaluate_policy(policy, robot, heights, (seed,), rate)
+        policy = Policy(with_shifts(content, shifts), "calibration", "policy")
+        results = evaluate_policy(policy, robot, heights, (seed,), card.rate)
         errors = np.nan_to_num([result.median_error_m for result in results])
         shifts -= errors.clip(-_TRUSTED, _TRUSTED) / number
         shifts = shifts.clip(-_MOST, _MOST)
-    return _mapped(content, heights, shifts)
-
-
-def _mapped(content: bytes, heights: tuple[float, ...], shifts: Array) -> bytes:
-    return with_command_map(content, CommandMap(heights, tuple(shifts.tolist())))
+    return with_shifts(content, shifts)

@@ -14,10 +14,10 @@ import numpy as np
 import torch
 from stable_baselines3 import SAC
 
-from hopping_leg.rl import sb3_policies
+from hopping_leg.envs.observation import Observation
 from hopping_leg.rl.checkpoint import Tree
 from hopping_leg.rl.learner import RecentHops
-from hopping_leg.rl.onnx_export import Network
+from hopping_leg.rl.onnx_export import Actor, DenseActor
 from hopping_leg.rl.sb3_env import TaskVecEnv
 
 _COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_current_progress_remaining")
@@ -32,6 +32,11 @@ class ResumableSAC(SAC):  # type: ignore[misc]
     env: TaskVecEnv
     seconds: dict[str, float]
     _current_progress_remaining: float
+
+    @property
+    def observation(self) -> Observation:
+        """What makes its observations."""
+        return self.env.task.observation
 
     @property
     def recent_hops(self) -> RecentHops:
@@ -81,10 +86,9 @@ class ResumableSAC(SAC):  # type: ignore[misc]
             left = self._current_progress_remaining
             self._current_progress_remaining = min(left, self.remaining())
 
-    def network(self) -> Network:
+    def network(self) -> Actor:
         """Return the deterministic actor as it stands."""
-        parts = [self.actor.latent_pi, self.actor.mu]
-        return sb3_policies.dense_network(parts, self.env.task.observation, "tanh")
+        return DenseActor(self.actor.latent_pi, self.actor.mu, torch.nn.Tanh())
 
     def state(self) -> Tree:
         """Return everything needed to continue exactly, its environment included."""

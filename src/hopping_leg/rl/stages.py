@@ -12,12 +12,8 @@ from typing import Any
 from hopping_leg.controllers.mpc import TrueStateMpc
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.distillation.dagger import DaggerConfig
-from hopping_leg.rl.policy_evaluation import (
-    CommandResult,
-    command_score,
-    evaluate_policy,
-    every_centimetre,
-)  # fmt: skip
+from hopping_leg.rl.onnx_export import every_centimetre
+from hopping_leg.rl.policy_evaluation import CommandResult, command_score, evaluate_policy
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot.parameters import Robot
 

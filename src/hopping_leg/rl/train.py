@@ -227,14 +227,11 @@ class Trainer:
         content, selected = self.selection.choose()
         self.end_stage(selected["worst_score_m"])
         if recipe.selection.calibrations:
-            content = calibrate(
-                content, self.robot, recipe.task.command_bounds, recipe.selection.calibrations,
-                recipe.task.rate,
-            )  # fmt: skip
+            content = calibrate(content, self.robot, recipe.selection.calibrations)
             selected |= self.selection.final(content)
             self.end_stage(selected["worst_score_m"])
         policy = Policy(content, "the selected policy", recipe.name)
-        heights, legs = policy_evaluation.every_centimetre(recipe.task.command_bounds), [self.robot]
+        heights, legs = onnx_export.every_centimetre(recipe.task.command_bounds), [self.robot]
         if self.legs:
             legs += [leg.true for leg in self.legs[:_RANGE_LEGS]]
             heights = heights[::_RANGE_STRIDE]
@@ -301,7 +298,7 @@ class Trainer:
             steps=int(self.learner.num_timesteps),
             versions=self.folder.config["versions"],
         )
-        return onnx_export.build_policy(self.learner.network(), card)
+        return onnx_export.build_policy(self.learner.network(), self.learner.observation, card)
 
     def _evaluate(self) -> None:
         steps = int(self.learner.num_timesteps)

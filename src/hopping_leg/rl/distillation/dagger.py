@@ -28,7 +28,6 @@ from hopping_leg.rl.checkpoint import Tree
 from hopping_leg.rl.distillation.buffer import LabelledRollout, RolloutBuffer
 from hopping_leg.rl.distillation.students import Student, StudentConfig
 from hopping_leg.rl.learner import RecentHops
-from hopping_leg.rl.onnx_export import Network
 from hopping_leg.rl.resumable import load_optimizer, to_numpy, to_torch
 from hopping_leg.robot import GRAVITY
 from hopping_leg.sim import LegSimulator
@@ -142,6 +141,7 @@ class Dagger:
         self.task, self.config = task, config
         self._hidden = HiddenState(task.legs, task.believed) if config.hidden_weight else None
         unseen = self._hidden.size if self._hidden else 0
+        self.observation = task.observation
         self.student = network.make(task.observation, unseen)
         self.optimizer = torch.optim.Adam(self.student.parameters(), lr=config.learning_rate)
         self.teacher = config.make_teacher(task)
@@ -306,9 +306,9 @@ class Dagger:
             loss = loss + config.hidden_weight * missed
         return loss
 
-    def network(self) -> Network:
+    def network(self) -> Student:
         """Return the student as it stands."""
-        return self.student.network(self.task.observation)
+        return self.student
 
     def state(self) -> Tree:
         """Return everything needed to continue exactly, environments included."""

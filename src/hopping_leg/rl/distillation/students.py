@@ -1,7 +1,7 @@
 """Networks that learn to act like a teacher: on a window of the past, or with a memory."""
 
 from abc import abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -10,8 +10,9 @@ from torch import nn
 
 from hopping_leg.envs.hidden_state import ERROR_GAIN, MISSED
 from hopping_leg.envs.observation import Observation
-from hopping_leg.rl import onnx_export, sb3_policies
+from hopping_leg.rl import sb3_policies
 from hopping_leg.rl.distillation.buffer import Batch, RolloutBuffer
+from hopping_leg.rl.onnx_export import Actor, DenseActor
 
 _MOST_SHIFT = 0.06
 """Largest correction of a command, over the leg's length."""
@@ -41,19 +42,11 @@ class StudentConfig:
         return WindowStudent(observation.size, list(self.hidden))
 
 
-class Student(nn.Module):
-    """A network from observation and memory to an action."""
+class Student(Actor):
+    """A network that can be taught."""
 
-    memory_size: int
-    """Entries m of its memory."""
     correction: float = 0.0
     """Gain of a correction of the command, see ``StudentConfig``."""
-
-    @abstractmethod
-    def forward(
-        self, observation: torch.Tensor, memory: torch.Tensor
-    ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return the action, unbounded, (n, 2), and the next memory, (n, m)."""
 
     @abstractmethod
     def recall(
@@ -61,26 +54,12 @@ class Student(nn.Module):
     ) -> tuple[Batch, torch.Tensor, torch.Tensor]:
         """Return about ``count`` ticks, and its actions and guesses of what is hidden there."""
 
-    @abstractmethod
-    def network(self, observation: Observation) -> onnx_export.Network:
-        """Return it as it stands, with the observation's normalisation."""
 
-
-class WindowStudent(Student):
+class WindowStudent(DenseActor, Student):
     """Dense layers on what is measured; what it has to remember must be in there."""
 
-    memory_size = 0
-
     def __init__(self, inputs: int, hidden: list[int]) -> None:
-        super().__init__()
-        self.layers = sb3_policies.dense(inputs, hidden, nn.Tanh)
-        self.layers.append(nn.Linear(hidden[-1], 2))
-
-    def forward(
-        self, observation: torch.Tensor, memory: torch.Tensor
-    ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return the action; nothing is remembered."""
-        return self.layers(observation), memory
+        super().__init__(*sb3_policies.dense(inputs, hidden, nn.Tanh), nn.Linear(hidden[-1], 2))
 
     def recall(
         self, buffer: RolloutBuffer, count: int, generator: torch.Generator
@@ -88,10 +67,6 @@ class WindowStudent(Student):
         """Return ticks drawn at random and its actions; it guesses nothing."""
         batch = buffer.ticks(count, generator)
         return batch, self.layers(batch.observations), batch.hidden
-
-    def network(self, observation: Observation) -> onnx_export.Network:
-        """Return its dense layers."""
-        return sb3_policies.dense_network([self.layers], observation, "clip")
 
 
 class RecurrentStudent(Student):
@@ -102,7 +77,7 @@ class RecurrentStudent(Student):
     to learn through. It learns by backpropagation through whole rollouts, from what it remembered
     at their start; a second readout has to guess what it cannot see, so that it remembers what
     tells of that. Behind the unit's own, its memory has the control periods since an update and the
-    shift of the command, see ``onnx_export.Correction``.
+    shift of the command.
 
     Episodes must begin with an update: at multiples of ``update_every`` of a rollout's ticks.
     """
@@ -127,7 +102,7 @@ class RecurrentStudent(Student):
         """Return the action and the next memory."""
         before, count, shift = torch.split(memory, [self._size, 1, 1], dim=-1)
         due, seen = (1 - count).clamp(0, 1), observation + shift * self.direction
-        if bool(due.any()):
+        if torch.onnx.is_in_onnx_export() or bool(due.any()):
             _, updated = self.unit(seen[None], before[None].contiguous())
             before = before + due * (updated[0] - before)
         known = self.layers(torch.cat([before, seen], dim=-1))
@@ -149,29 +124,3 @@ class RecurrentStudent(Student):
         known = self.layers(torch.cat([remembered, seen], dim=-1))
         guesses = batch.hidden if self.guess is None else self.guess(known)
         return batch, self.action(known), guesses
-
-    def network(self, observation: Observation) -> onnx_export.Network:
-        """Return its recurrent unit and dense layers."""
-        with torch.no_grad():
-            weights = [w.double().numpy().copy() for w in self.unit.all_weights[0]]
-        weights[0] = weights[0][:, observation.order]
-        network = sb3_policies.dense_network(
-            [self.layers, self.action], observation, "clip", self._size
-        )
-        of_input, of_memory, *biases = weights
-        unit = onnx_export.RecurrentUnit(
-            of_input, of_memory, biases[0], biases[1], self.every, self._correction(observation)
-        )
-        return replace(network, memory=unit)
-
-    def _correction(self, observation: Observation) -> onnx_export.Correction | None:
-        if self.guess is None or not self.correction:
-            return None
-        weight, bias = sb3_policies.layer_weights(self.guess)
-        return onnx_export.Correction(
-            weight[MISSED : MISSED + 1] / ERROR_GAIN,
-            bias[MISSED : MISSED + 1] / ERROR_GAIN,
-            self.correction,
-            _MOST_SHIFT,
-            observation.command_direction[observation.order],
-        )
