@@ -20,10 +20,10 @@ CEILINGS = {
     "src/hopping_leg/robot/**/*.py": (17, 2800),
     "src/hopping_leg/sim/**/*.py": (13, 2520),
     "src/hopping_leg/viewer/**/*.py": (8, 1380),
-    "src/**/*.py": (199, 31330),
+    "src/**/*.py": (199, 31340),
     "tests/**/*.py": (146, 16810),
-    "studies/**/*.py": (83, 8530),
-    "docs/**/*.md": (22, 2540),
+    "studies/**/*.py": (82, 8520),
+    "docs/**/*.md": (22, 2530),
     "docs/live/*.js": (13, 1490),
 }
 """Files and lines at most. Who raises one says what users gain by it."""

@@ -5,7 +5,7 @@ Each comparison is one that no healthy leg fails, whatever its mass, friction, p
 - A joint that moved does not come to rest to the last bit within a tick. It does not stay so while
   the torque on it changes by more than its friction. And a sensor with noise never stays so. A dead
   encoder, which repeats a position with a velocity of zero, does all three.
-- Over some hundredths of a second, the way of a position is the integral of its velocity.
+- From reply to reply the way of a position is the integral of its velocity, but for impacts.
 - What a motor gives is what it was told, within what it can give at its speed, and always about as
   late: where the torques of both joints come later than before, samples are old.
 """
@@ -26,17 +26,18 @@ _NOISY = 20  # replies of which none repeated another, after which a sensor is k
 
 _FADING = 0.03  # s, within which comparisons of one joint forget
 _IMPACT = 2.0  # Change of speed between two replies beyond which velocities do not tell the way
-_WAY = 8e-4  # rad2, of squared ways that must be known
-_SAME_WAY = 0.6  # least slope of position over velocity's integral, and of that over position
-_PUSH = 2e-3  # of squared torques over the limit squared that must be known
-_GIVEN = 0.3  # least torque reported over torque told
+_WAY = 4e-3  # rad between two replies from which on position and velocity are compared
+_OTHER_WAY = (1e-3, 0.33)  # rad, and share of the longer way, by which they may differ
+_CONTRADICTIONS = 7  # in a row; impacts and play make four
+_PUSH = 1e-2  # of squared torques over the limit squared that must be known
+_GIVEN = 0.1  # least torque reported over torque told
 
 _TICKS = 4  # by which a reported torque may come after the command
 _LATEST = 1  # ticks less one by which a healthy drive's torque comes after the command
 _LAG_FADING = 0.05  # s
 _LAG_CHANGE = 0.01  # of squared changes of torque over the limit squared that must be known
-_LAG_CLEAR = 1.5  # factor by which one lag must explain the torques better than any other
-_LAG_WORSE = 4.0  # factor by which the usual lag must explain them worse
+_LAG_CLEAR = 3.0  # factor by which one lag must explain the torques better than any other
+_LAG_WORSE = 16.0  # factor by which the usual lag must explain them worse
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +74,7 @@ class JointEvidence:
         stillest: Most of them that were so before.
         speed_before: Speed before them, rad/s.
         torques: Lowest and highest torque that was told meanwhile, N m.
-        ways: Sums of the squared integral of velocity, of its product with the position's way, and
-            of that way squared, rad2, fading.
+        contradictions: Times in a row that a moving joint's position and velocity differed.
         newer, older: Sums of the squared torque that was told one tick, two ticks before, and of
             its product with the reported torque, over the limit squared, fading.
         told: Torque that was told in the tick before, N m.
@@ -85,7 +85,7 @@ class JointEvidence:
     stillest: int = 0
     speed_before: float = 0.0
     torques: Pair = (0.0, 0.0)
-    ways: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    contradictions: int = 0
     newer: Pair = (0.0, 0.0)
     older: Pair = (0.0, 0.0)
     told: float = 0.0
@@ -104,18 +104,22 @@ class JointEvidence:
             if self.still:
                 before = self.speed_before
                 torques = min(self.torques[0], told), max(self.torques[1], told)
-        ways, newer, older = (0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0)
+        contradictions, newer, older = self.contradictions, (0.0, 0.0), (0.0, 0.0)
         if 0 < elapsed < _FADING:
             fading = math.exp(-elapsed / _FADING)
-            vv, vw, ww = (fading * value for value in self.ways)
             if abs(reply.velocity - last.velocity) <= _IMPACT:
                 integral = elapsed * (last.velocity + reply.velocity) / 2
-                vv, vw, ww = vv + integral * integral, vw + integral * way, ww + way * way
-            ways, given = (vv, vw, ww), reply.torque / motor.limit
+                longer, (least, share) = max(abs(way), abs(integral)), _OTHER_WAY
+                if longer > _WAY:
+                    differs = abs(way - integral) > least + share * longer
+                    contradictions = contradictions + 1 if differs else 0
+            if reply.velocity * last.velocity <= 0:  # it may rattle in its play
+                contradictions = 0
+            given = reply.torque / motor.limit
             newer = _summed(self.newer, fading, motor.share(told, reply.velocity), given)
             older = _summed(self.older, fading, motor.share(self.told, reply.velocity), given)
         return JointEvidence(
-            self.replies + 1, still, stillest, before, torques, ways, newer, older, told
+            self.replies + 1, still, stillest, before, torques, contradictions, newer, older, told
         )
 
     def dead(self, motor: MotorLine) -> str:
@@ -134,10 +138,9 @@ class JointEvidence:
 
     def false_velocity(self) -> str:
         """Return how velocity and position contradict each other, "" if they do not."""
-        vv, vw, ww = self.ways
-        if vv + ww < _WAY or vw >= _SAME_WAY * max(vv, ww):
+        if self.contradictions < _CONTRADICTIONS:
             return ""
-        return f"it moved by {vw / max(vv, 1e-12):.2g} of what its velocity adds up to"
+        return f"{self.contradictions} times in a row it moved otherwise than its velocity says"
 
     def false_torque(self) -> str:
         """Return how reported and told torque contradict each other, "" if they do not."""

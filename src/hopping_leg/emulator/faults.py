@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
-from moteus.protocol import Register
 
 from hopping_leg.emulator import reply_queue, settings
 from hopping_leg.errors import UsageError, unknown_name
@@ -300,7 +299,9 @@ class _UnderVoltage(_OverVoltage, kind="under_voltage"):
     text, value = "the bus voltage sags to", 10.0
 
 
-_SAMPLE = (Register.POSITION, Register.VELOCITY, Register.TORQUE)
+_SAMPLE = _POSITION, _VELOCITY, _TORQUE = 0x001, 0x002, 0x003
+_MULTIPLEX_ID = 0x110
+"""Registers, as numbers: kinds are listed without the client library."""
 
 
 class _Lie(FaultKind):
@@ -327,7 +328,7 @@ class _EncoderDead(_Lie, kind="encoder_dead"):
     text = "a position repeats, its velocity is zero"
 
     def lie(self, drive: "EmulatedDrive") -> "Callable[[dict[int, float]], dict[int, float]]":
-        said = {Register.POSITION: drive.state()[Register.POSITION], Register.VELOCITY: 0.0}
+        said = {_POSITION: drive.state()[_POSITION], _VELOCITY: 0.0}
         return lambda true: true | said
 
 
@@ -341,12 +342,12 @@ class _SampleFrozen(_Lie, kind="sample_frozen"):
 
 class _VelocityFalse(_Lie, kind="velocity_false"):
     text, unit, value = "a velocity is this many times the true one", "1", 0.5
-    register = Register.VELOCITY
+    register = _VELOCITY
 
 
 class _TorqueFalse(_Lie, kind="torque_false"):
     text, unit, value = "a torque is reported as this many times the true one", "1", 0.0
-    register = Register.TORQUE
+    register = _TORQUE
 
 
 class _StaleSample(_Lie, kind="stale_sample"):
@@ -377,7 +378,7 @@ class _SwappedReplies(_Lie, kind="swapped_replies"):
 
     def lie(self, drive: "EmulatedDrive") -> "Callable[[dict[int, float]], dict[int, float]]":
         other = next(one for one in self.robot.drives if one is not drive)
-        return lambda true: other.true_state() | {Register.MULTIPLEX_ID: drive.id}
+        return lambda true: other.true_state() | {_MULTIPLEX_ID: drive.id}
 
 
 class _SameId(FaultKind, kind="same_id"):
