@@ -146,10 +146,10 @@ def settled_apexes(trace: Trace, truth: Array) -> Array:
 
     Args:
         trace: Of the run; it ends when the truth does.
-        truth: Times, s, heights and clearances of the leg, m, (rows, 3).
+        truth: Of the leg, as ``Lockstep`` has it.
     """
     hopping = _hopping(trace).column("time_s") - trace.column("time_s")[-1]
-    at, height, clearance = truth.T
+    at, height, clearance = truth.T[:3]
     peaks, _ = find_peaks(height, prominence=BOUNCE)
     since_end = at[peaks] - at[-1]
     counted = (hopping[0] + START_SECONDS <= since_end) & (since_end <= hopping[-1])
