@@ -9,6 +9,7 @@ import numpy as np
 
 from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.fallback import with_fallback
+from hopping_leg.controllers.protocol import Controller
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.drive_info import home, inspect
 from hopping_leg.deploy.hardware_trials import Performance, header_of, perform
@@ -19,9 +20,11 @@ from hopping_leg.deploy.realtime import Clock
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.emulator.faults import Fault
-from hopping_leg.emulator.server import EmulatorConfig
-from hopping_leg.robot import Robot, SoftLimits
+from hopping_leg.emulator.robot import EmulatedRobot
+from hopping_leg.emulator.server import EmulatorConfig, posture
+from hopping_leg.robot import Robot, SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE, SoftLimiter
+from hopping_leg.sim.randomization import TWIN_RANGES, Range, draw_twin
 from studies.fault_campaign.families import Family, Mishap
 from studies.fault_campaign.verdict import Limits
 
@@ -29,6 +32,12 @@ HEIGHTS = (0.25, 0.30, 0.35)
 """Commanded heights, m; each trial takes one."""
 
 _TIMING = SequenceTiming(hop=0.0, rise=0.3, settle=0.1)
+_BEYOND = (
+    Range("reality.mass.base", "1", 1.0, 1.2, "payload"),
+    Range("hip.friction", "N m", 0.0, 1.0, "dry joint"),
+    Range("knee.friction", "N m", 0.0, 1.0, "dry joint"),
+)
+"""What healthy twins have beyond the others."""
 _FIRST_HOP = 0.6
 """Time that the first lift-off may take, s."""
 _AFTERWARDS = 0.3
@@ -107,12 +116,43 @@ class Scene:
             robot=case.robot,
             seed=int(rng.integers(1 << 30)),
         )
-        self.safety_limits = hopping_limits(robot, CONTROL_RATE)
-        self.limits = Limits.of(robot, self.safety_limits)
+        if self.mishap.health is not None:
+            self.robot = load_robot(self.mishap.health.robot)
+        self.safety_limits = hopping_limits(self.robot, CONTROL_RATE)
+        self.limits = Limits.of(self.robot, self.safety_limits)
         self.height = float(rng.choice(HEIGHTS))
         self.checksums = bool(rng.random() < 0.5)
         self.killed_after = float(rng.uniform(0, 0.01))
         """Time of the computer between the moment of the hop and a kill, s."""
+
+    def emulate(self) -> EmulatedRobot:
+        """Return the emulated robot: as it starts, or a healthy one."""
+        health = self.mishap.health
+        if health is None:
+            return self.start.build()
+        true = self.robot
+        if health.twin is not None:
+            true = draw_twin(health.twin, health.robot, (*TWIN_RANGES, *_BEYOND)).robot
+        return EmulatedRobot(true, posture(self.robot, "stand"), seed=self.start.seed)
+
+    def _sequence(self, controller: Controller) -> MotionSequence:
+        """Return how the leg rises, hops beyond the mishap, and sinks."""
+        timing = SequenceTiming() if self.family.grounded else _TIMING
+        timing = dataclasses.replace(timing, hop=_FIRST_HOP + self.mishap.at + _AFTERWARDS)
+        schedule: tuple[tuple[float, float], ...] = ((self.height, 100.0),)
+        checked = self.robot if self.family.grounded or self.family.lies else None
+        if health := self.mishap.health:
+            hop, settle = (1.0, 6.0) if health.stands else (6.0, 1.0)
+            timing, checked = SequenceTiming(hop=hop, settle=settle), self.robot
+            schedule = tuple((height, 0.75) for height in health.commands)
+        return MotionSequence(
+            with_fallback(controller, self.robot),
+            CommandSchedule(schedule),
+            hopping_poses(self.robot),
+            SoftLimiter(self.robot, SoftLimits()),
+            timing,
+            checked=checked,
+        )
 
     def require_fitness(self, link: MoteusLink) -> None:
         """Check the drives as before arming, homed if the mishap says so.
@@ -132,15 +172,7 @@ class Scene:
             KeyboardInterrupt: A signal stopped the leg.
         """
         controller = load_controller(self.case.controller, self.robot)
-        timing = SequenceTiming() if self.family.grounded else _TIMING
-        sequence = MotionSequence(
-            with_fallback(controller, self.robot),
-            CommandSchedule(((self.height, 100.0),)),
-            hopping_poses(self.robot),
-            SoftLimiter(self.robot, SoftLimits()),
-            dataclasses.replace(timing, hop=_FIRST_HOP + self.mishap.at + _AFTERWARDS),
-            checked=self.robot if self.family.grounded or self.family.lies else None,
-        )
+        sequence = self._sequence(controller)
         self.require_fitness(link)
         header, file = header_of(self.robot, controller, CONTROL_RATE), folder / "run.parquet"
         real = clock is None
@@ -163,6 +195,9 @@ def words(mishap: Mishap) -> str:
     if mishap.fault is not None:
         both = map(_of_fault, filter(None, (mishap.fault, mishap.second)))
         return f"{' and '.join(both)} at {mishap.fault.at:.3f} s"
+    if health := mishap.health:
+        twin = "" if health.twin is None else f", twin {health.twin}"
+        return f"{health.robot}{twin}{', stands' if health.stands else ''}"
     if mishap.dies:
         return f"killed at {mishap.at:.3f} s"
     return f"stalled for {mishap.stall:.3f} s at {mishap.at:.3f} s"

@@ -16,6 +16,24 @@ HOP_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
+class Health:
+    """A leg of which nothing fails, for ten seconds.
+
+    Attributes:
+        robot: Shipped robot that the host is told.
+        twin: Seed of the twin of it that hops, with its noise, play, friction and payload; None for
+            the robot of the file.
+        stands: Whether it stands for most of the time, rather than hop.
+        commands: Heights, m, one after the other.
+    """
+
+    robot: str
+    twin: int | None
+    stands: bool
+    commands: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Mishap:
     """What happens in one trial.
 
@@ -27,6 +45,7 @@ class Mishap:
         start: Differences of the start, where the leg must not be armed at all.
         homed: Whether the drives are told that the leg stands in its start pose.
         at: When, s after the first lift-off.
+        health: Where nothing happens.
     """
 
     fault: Fault | None = None
@@ -36,6 +55,7 @@ class Mishap:
     start: EmulatorConfig | None = None
     homed: bool = False
     at: float = 0.0
+    health: Health | None = None
 
 
 Draw = Callable[[np.random.Generator], Mishap]
@@ -139,6 +159,13 @@ def _wiring(rng: np.random.Generator) -> Mishap:
     return Mishap(start=start, homed=homed)
 
 
+def _nothing(rng: np.random.Generator) -> Mishap:
+    robot = str(rng.choice(["legv1", "legv2", "legv2-identified", "legv2-paper"]))
+    twin = int(rng.integers(1 << 30)) if rng.random() < 0.6 else None
+    heights = tuple(float(height) for height in rng.uniform(0.22, 0.38, 8))
+    return Mishap(health=Health(robot, twin, bool(rng.random() < 0.1), heights))
+
+
 _SETTINGS = {
     "motor_position.rotor_to_output_ratio": (1.0, 0.1, 1 / 9),
     "servopos.position_min": (-0.01, -0.2, float("nan")),
@@ -210,17 +237,24 @@ _LIES: dict[str, Values] = {
 """Kinds of fault in which a drive answers in time, and not the truth."""
 
 
-def _lie(kind: str, second: bool = False) -> Draw:
-    """Return what draws a lie from arming to sinking, with a severe fault soon after if asked."""
+def _lying(kind: str, at: float, rng: np.random.Generator) -> Fault:
+    return Fault(kind, at=at, **{"drive": _drive(rng), **_LIES[kind](rng)})
+
+
+def _lie(kind: str) -> Draw:
+    """Return what draws a lie of a kind from arming to sinking."""
 
     def draw(rng: np.random.Generator) -> Mishap:
-        at = float(rng.uniform(0, LIES))
-        chosen = kind or str(rng.choice(list(_LIES)))
-        lie = Fault(chosen, at=at, **{"drive": _drive(rng), **_LIES[chosen](rng)})
-        other = _severe("powered", at, at + 0.1)(rng).fault if second else None
-        return Mishap(lie, other, at=HOP_SECONDS)
+        return Mishap(_lying(kind, float(rng.uniform(0, LIES)), rng), at=HOP_SECONDS)
 
     return draw
+
+
+def _lie_and_fault(rng: np.random.Generator) -> Mishap:
+    """A lie from arming to sinking, and a severe fault within 0.1 s of it."""
+    at = float(rng.uniform(0, LIES))
+    lie = _lying(str(rng.choice(list(_LIES))), at, rng)
+    return Mishap(lie, _severe("powered", at, at + 0.1)(rng).fault, at=HOP_SECONDS)
 
 
 _R = Reason
@@ -242,6 +276,8 @@ _LIED = (
     _R.STANDS_WRONG, _R.REPLIES_MISSING, _R.DRIVE_TIMEOUT, _R.CONTROLLER_FAILED,
 )  # fmt: skip
 """What lies are noticed by; a run may end as planned where one did no harm."""
+_HEALTHY = (_R.FINISHED, _R.POSITION_LIMIT, _R.SPEED_LIMIT, _R.TORQUE_LIMIT, _R.STANDS_WRONG)
+"""What ends a run of a leg whose controller does not cope with it; its drives do not lie."""
 _MISWIRED = (_R.STANDS_WRONG, _R.POSITION_LIMIT, _R.SPEED_LIMIT)
 _DRIFT = (_R.ENCODER_DRIFT, _R.ENCODER_JUMP, _R.POSITION_LIMIT)
 
@@ -283,7 +319,8 @@ FAMILIES = {
         Family("swapped replies", _lie("swapped_replies"), _LIED, lies=True),
         Family("one id for two", _lie("same_id"), _LIED, lies=True),
         Family("fast clock", _lie("fast_clock"), _LIED, lies=True),
-        Family("lie and fault", _lie("", second=True), (*_LIED, *_STOPS), lies=True),
+        Family("lie and fault", _lie_and_fault, (*_LIED, *_STOPS), lies=True),
+        Family("no fault", _nothing, _HEALTHY),
         Family("stalled host", _stall, (_R.LOOP_STALLED, _R.DRIVE_TIMEOUT)),
         Family("killed host", _death),
         Family("wrong boot pose", _pose, refused=True),

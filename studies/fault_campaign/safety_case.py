@@ -34,6 +34,8 @@ def _row(family: Family, tried: dict[str, Any]) -> dict[str, Any]:
     elif family.lies:
         noticed = "what a drive says, against itself and against what it was told"
         follows = "the drives brake, or it hops on unharmed"
+    elif family.name == "no fault":
+        noticed, follows = "nothing may be", "it hops or stands for ten seconds"
     elif family.name == "killed host":
         noticed, follows = "the drives' watchdogs", "the drives brake by themselves"
     else:

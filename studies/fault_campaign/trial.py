@@ -109,7 +109,7 @@ def play(case: Case, family: Family, robot: Robot) -> Result:
 
 def _logged(scene: Scene) -> tuple[Lockstep, WireLog]:
     """Return the robot of a trial and the log of its wire."""
-    lockstep, log = Lockstep(scene.start.build(), checksums=scene.checksums), WireLog()
+    lockstep, log = Lockstep(scene.emulate(), checksums=scene.checksums), WireLog()
     lockstep.robot.observer = log
     return lockstep, log
 
@@ -145,7 +145,7 @@ def _hop(scene: Scene) -> Result:
             lockstep.link.close()
     injector = lockstep.robot.fault_injector
     result.began = injector.log[0][0] if injector.log else clock.began
-    if mishap.start is not None:
+    if mishap.start is not None or mishap.health is not None:
         result.began = injector.powered
     if result.began is None:
         result.problems.append("the mishap did not happen")

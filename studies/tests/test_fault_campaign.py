@@ -36,7 +36,8 @@ def test_a_family_draws_the_same_from_the_same_seed_and_much_else_from_others(na
     assert family.draw(np.random.default_rng(0)) == mishaps[0]
     assert len({str(mishap) for mishap in mishaps}) > 10
     assert all(0 <= mishap.at <= HOP_SECONDS for mishap in mishaps)
-    assert all(m.fault is not None or m.start is not None or m.stall or m.dies for m in mishaps)
+    for m in mishaps:
+        assert m.fault or m.start or m.stall or m.dies or m.health
     at_start = family.refused or family.grounded
     assert all((mishap.start is not None) == at_start for mishap in mishaps)
     assert family.reasons or family.refused or name == "killed host"
@@ -114,6 +115,13 @@ def test_an_unsafe_host_is_found_out(monkeypatch, torque, word):
     monkeypatch.setattr(loop, "supervise", spoiled)
     row = play_case(Case("limit notice", "energy-shaping", "legv2-paper", 0, 0))
     assert any(word in problem for problem in row["problems"]), row["problems"]
+
+
+def test_a_false_alarm_of_a_healthy_leg_is_a_problem(monkeypatch):
+    monkeypatch.setattr("hopping_leg.deploy.plausibility._GIVEN", 2.0)
+    row = play_case(Case("no fault", "energy-shaping", "legv2", 0, 0))
+    assert row["reason"] == "TORQUE_FALSE"
+    assert "the reason is TORQUE_FALSE" in row["problems"][0]
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """What drives say: healthy ones are believed, whatever their sensors; each lie is told apart."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -67,7 +68,15 @@ def test_a_joint_that_rests_is_believed_until_its_torque_changes_or_it_had_noise
     assert "torque changed" in evidence(rest, lambda t: 3.0 if t > 0.4 else 0.0).dead(MOTOR)
     noisy = replies(lambda _: 0.3, 1e-4)
     assert evidence(noisy).dead(MOTOR) == ""
-    assert "no reading repeated" in evidence([*noisy[:80], *rest[80:]]).dead(MOTOR)
+    assert "no readings repeated" in evidence([*noisy[:80], *rest[80:]]).dead(MOTOR)
+
+
+def test_an_encoder_that_dies_when_it_is_powered_is_told_by_the_noise_before():
+    noisy, rest = replies(lambda _: 0.3, 1e-4), replies(lambda _: 0.3)
+    unpowered = [replace(reply, mode=DriveMode.STOPPED) for reply in noisy[:10]]
+    assert evidence([*unpowered, *rest[10:17]]).dead(MOTOR)
+    held = [replace(reply, mode=DriveMode.STOPPED) for reply in rest[:10]]
+    assert evidence([*held, *noisy[10:30], *rest[30:]]).dead(MOTOR) == ""
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0, -1.0])
@@ -95,6 +104,10 @@ def test_torques_that_come_later_than_before_make_samples_old(before, after, sta
         pair = told(t - PERIOD), told(t - PERIOD)
         known = known.after((MOTOR, MOTOR), (reply, reply), pair)
     assert bool(known.stale()) == stale
+    after_a_gap = LagEvidence(usual=known.usual)
+    for _ in range(3):
+        after_a_gap = after_a_gap.after((MOTOR, MOTOR), (reply, reply), pair)
+        assert after_a_gap.usual == known.usual
 
 
 @pytest.mark.parametrize(

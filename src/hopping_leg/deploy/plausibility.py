@@ -1,6 +1,7 @@
 """Whether what the drives say can be true: position, velocity, torque and command together.
 
-Each comparison is one that no healthy leg fails, whatever its mass, friction, play or ground:
+Each comparison holds for healthy legs of any mass, friction, play and ground; their thresholds
+leave room for impacts, play and noise, and were set on simulated runs:
 
 - A joint that moved does not come to rest to the last bit within a tick. It does not stay so while
   the torque on it changes by more than its friction. And a sensor with noise never stays so. A dead
@@ -22,7 +23,9 @@ speed is below 3e-3 rad/s before."""
 _MOVED = 0.02  # rad/s, beyond which a joint did move before
 _DEAD = 4  # replies in a row at rest
 _STILL_TORQUE = (0.2, 4.0)  # N m, and times the file's friction: change of torque that moves it
-_NOISY = 20  # replies of which none repeated another, after which a sensor is known to have noise
+_NOISY, _CHANCE, _SILENT = 8, 1, 6
+"""A sensor is known to have noise after so many replies of which no more in a row repeated another
+than by chance; so many replies in a row at rest are then too many."""
 
 _FADING = 0.03  # s, within which comparisons of one joint forget
 _IMPACT = 2.0  # Change of speed between two replies beyond which velocities do not tell the way
@@ -34,7 +37,7 @@ _GIVEN = 0.1  # least torque reported over torque told
 
 _TICKS = 4  # by which a reported torque may come after the command
 _LATEST = 1  # ticks less one by which a healthy drive's torque comes after the command
-_LAG_FADING = 0.05  # s
+_LAG_FADING = 10  # ticks
 _LAG_CHANGE = 0.01  # of squared changes of torque over the limit squared that must be known
 _LAG_CLEAR = 3.0  # factor by which one lag must explain the torques better than any other
 _LAG_WORSE = 16.0  # factor by which the usual lag must explain them worse
@@ -69,9 +72,9 @@ class JointEvidence:
     """What the replies of one drive told lately.
 
     Attributes:
-        replies: How many there were since the drive was powered.
-        still: Of them in a row at rest to the last bit, until now.
-        stillest: Most of them that were so before.
+        replies: How many there were.
+        still: Of them in a row at rest to the last bit, until now, while the drive was powered.
+        stillest: Most of them in a row that were so before.
         speed_before: Speed before them, rad/s.
         torques: Lowest and highest torque that was told meanwhile, N m.
         contradictions: Times in a row that a moving joint's position and velocity differed.
@@ -94,12 +97,15 @@ class JointEvidence:
         self, motor: MotorLine, last: Reply | None, reply: Reply, told: float
     ) -> "JointEvidence":
         """Return the evidence with a reply; ``told`` is the torque in force since the last, N m."""
-        if last is None or reply.mode != DriveMode.POSITION:  # else a leg may be held, or stand
+        if last is None:
             return JointEvidence(told=told)
         elapsed, way = reply.taken - last.taken, reply.position - last.position
+        same_speed = abs(reply.velocity) <= _STILL_SPEED or reply.velocity == last.velocity
+        repeats = abs(way) <= _STILL_RADIANS and same_speed
+        if reply.mode != DriveMode.POSITION:  # a leg may be held, or stand
+            return JointEvidence(self.replies + 1, stillest=self.stillest + repeats, told=told)
         still, stillest, before, torques = 0, max(self.stillest, self.still), 0.0, (told, told)
-        repeats = abs(reply.velocity) <= _STILL_SPEED or reply.velocity == last.velocity
-        if abs(way) <= _STILL_RADIANS and repeats:
+        if repeats:
             still, stillest, before = self.still + 1, self.stillest, abs(last.velocity)
             if self.still:
                 before = self.speed_before
@@ -128,8 +134,9 @@ class JointEvidence:
             return ""
         if self.speed_before > _MOVED:
             return f"at rest to the last bit after {self.speed_before:.2g} rad/s"
-        if self.stillest == 0 and self.replies - self.still > _NOISY:
-            return f"{self.still} times the same where no reading repeated another before"
+        noisy = self.stillest <= _CHANCE and self.replies - self.still > _NOISY
+        if noisy and self.still >= _SILENT:
+            return f"{self.still} times the same where no readings repeated others before"
         least, times = _STILL_TORQUE
         change = self.torques[1] - self.torques[0]
         if change > least + times * motor.friction:
@@ -177,9 +184,8 @@ class LagEvidence:
         """Return the evidence with fresh replies of both drives, a tick after the last ones."""
         past = (told, *self.told)[:_TICKS]
         if len(past) < _TICKS:
-            return LagEvidence(past)
-        elapsed = _FADING / 6  # a tick
-        fading = math.exp(-elapsed / _LAG_FADING)
+            return LagEvidence(past, usual=self.usual)
+        fading = math.exp(-1 / _LAG_FADING)
         errors, changes = [fading * error for error in self.errors], fading * self.changes
         for joint, (motor, reply) in enumerate(zip(motors, replies, strict=True)):
             shares = [motor.share(pair[joint], reply.velocity) for pair in past]

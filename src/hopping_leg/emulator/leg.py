@@ -13,22 +13,19 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.deploy.drive_link import joint_transforms
 from hopping_leg.robot import model as robot_model
-from hopping_leg.robot.model_mismatch import SensorMismatch
+from hopping_leg.robot.model_mismatch import STANDING_NOISE, SensorMismatch
 from hopping_leg.robot.parameters import Joint, Robot
 from hopping_leg.sim import LegSimulator
 
 TIMESTEP = 5e-4
 """Period of the drives' control, s; the physics steps more often within it."""
 
-_SENSORS = (
-    SensorMismatch(position_noise=1.4e-4, velocity_noise=0.09, torque_noise=0.06),
-    SensorMismatch(position_noise=4e-5, velocity_noise=0.04, torque_noise=0.03),
-)
-"""Of hip and knee where a robot's file says nothing: what leg V2's drives report at rest."""
-
 
 class EmulatedLeg:
     """One leg, stepped by one physics step at a time.
+
+    Its sensors have ``STANDING_NOISE`` where the robot's file names no noise: no real one is
+    without.
 
     Args:
         robot: What is simulated; its ``reality`` holds.
@@ -41,9 +38,10 @@ class EmulatedLeg:
         self.wiring = [1.0, 1.0]  # Joint angles as the drives believe them over the true ones
         free = replace(robot, hip=_unlimited(robot.hip), knee=_unlimited(robot.knee))
         immediate = replace(robot.reality.latency, command=0.0, jitter=0.0)
+        drives = zip((robot.reality.hip, robot.reality.knee), STANDING_NOISE, strict=True)
         hip, knee = (
-            replace(drive, sensor=_SENSORS[joint]) if drive.sensor == SensorMismatch() else drive
-            for joint, drive in enumerate((robot.reality.hip, robot.reality.knee))
+            replace(drive, sensor=noise) if drive.sensor == SensorMismatch() else drive
+            for drive, noise in drives
         )
         reality = replace(robot.reality, latency=immediate, hip=hip, knee=knee)
         free = replace(free, reality=reality)
@@ -85,6 +83,10 @@ class EmulatedLeg:
             transform.motor_velocity(ratio * float(legs.measured_qd[0, joint])),
             transform.motor_torque(float(legs.measured_torque[0, joint]) / ratio),
         )
+
+    def hold(self) -> None:
+        """Stay where it is for a physics step; the sensors report with other noise."""
+        self._legs.read_sensors()
 
     def step(self, motor_torque: tuple[float, float]) -> None:
         """Go on by one physics step with torques at the motors' outputs, N m."""

@@ -122,7 +122,9 @@ class EmulatedRobot:
         hip, knee = (drive.step(self.time, leg.TIMESTEP) for drive in self.drives)
         if self.held and all(drive.active for drive in self.drives):
             self.held = False
-        if not self.held:
+        if self.held:
+            self.leg.hold()
+        else:
             self.leg.step((hip, knee))
         self.time += leg.TIMESTEP
         self._sense()

@@ -19,6 +19,7 @@ from hopping_leg.robot.model import (
 )
 from hopping_leg.robot.model_mismatch import (
     NO_MISMATCH,
+    STANDING_NOISE,
     DriveMismatch,
     GroundMismatch,
     Latency,
@@ -50,6 +51,7 @@ __all__ = [
     "NO_MISMATCH",
     "OVERSPEED",
     "REGISTER_MAP",
+    "STANDING_NOISE",
     "TIMESTEP",
     "Contact",
     "DriveMismatch",

@@ -38,6 +38,13 @@ class SensorMismatch:
     torque_noise: float = quantity("N m", 0.0, zero=True)
 
 
+STANDING_NOISE = (
+    SensorMismatch(position_noise=1.4e-4, velocity_noise=0.09, torque_noise=0.06),
+    SensorMismatch(position_noise=4e-5, velocity_noise=0.04, torque_noise=0.03),
+)
+"""Of hip and knee: what leg V2's drives report while it stands still."""
+
+
 @dataclass(frozen=True)
 class DriveMismatch:
     """Motor, gear and belt of one joint; all numbers at the joint's side."""

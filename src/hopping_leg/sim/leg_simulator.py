@@ -191,12 +191,16 @@ class LegSimulator(Simulator):
                 self._push, first, last, self.substeps, self.timestep,
             )
         )  # fmt: skip
+        self.read_sensors()
+        return self._memory["mean_torque"].copy()
+
+    def read_sensors(self) -> None:
+        """Let the sensors report anew, with other noise; a step ends with it."""
         if self._disturbed:
             draws = self.rng.standard_normal((self.count, 6)) if self._noisy else self._reading
             stepper.read_sensors(
                 self.table, self._memory, self._past, draws, self._reading, self.timestep
             )
-        return self._memory["mean_torque"].copy()
 
     def in_parallel(self, work: Callable[[int, int], None]) -> None:
         """Do something for the legs from a first to before a last one, on as many threads."""

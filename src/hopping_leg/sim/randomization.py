@@ -23,6 +23,7 @@ from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.io import Tree, replace_at, write_atomically
 from hopping_leg.robot import (
     JOINTS,
+    STANDING_NOISE,
     Robot,
     check_physics,
     robot_from_tree,
@@ -183,9 +184,9 @@ def normalized(robot: Robot, variants: Sequence[Robot], ranges: Sequence[Range])
 
 def _drives() -> tuple[Range, ...]:
     ranges: list[Range] = []
-    for name, belt in (("hip", 1.0), ("knee", 2.0)):
+    for name, belt, sensor in zip(JOINTS, (1.0, 2.0), STANDING_NOISE, strict=True):
         at = f"reality.{name}"
-        noise = {"hip": (1.4e-4, 0.09, 0.06), "knee": (4e-5, 0.04, 0.03)}[name]
+        noise = sensor.position_noise, sensor.velocity_noise, sensor.torque_noise
         step = 6.4e-5 / belt
         ranges += [
             Range(f"{at}.torque_gain", "1", 0.9, 1.0, "[R] boom recordings 0.91"),
