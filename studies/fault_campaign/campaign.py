@@ -123,12 +123,15 @@ def _family_row(name: str, rows: Sequence[Row]) -> Row:
     fair = [row for row in own if not row["disturbed"]]
     reactions = [row["reaction"] for row in fair if row["reaction"] is not None]
     reasons = Counter(row["reason"] or "KILLED" for row in own)
+    shown = [row["shown"] for row in own if row["shown"] is not None]
     return {
         "family": name,
         "trials": len(own),
         "unsafe": _unsafe(own),
         "reasons": dict(reasons.most_common()),
         "reaction_p99_s": _percentile(reactions, 99),
+        "shown_p50_s": _percentile(shown, 50),
+        "shown_p99_s": _percentile(shown, 99),
         "braked_max_s": max((r["braked"] for r in own if r["braked"] is not None), default=None),
     }
 
@@ -166,11 +169,11 @@ def _robot(name: str) -> Robot:
 def show(result: Row) -> None:
     """Print the campaign's table and what was unsafe."""
     show_table(
-        ("family", "trials", "unsafe", "ended for", "reaction 99 %, ms"),
+        ("family", "trials", "unsafe", "ended for", "reaction 99 %, ms", "shown 99 %, ms"),
         (
             (row["family"], row["trials"], row["unsafe"],
              ", ".join(f"{name.lower()} {n}" for name, n in row["reasons"].items()),
-             _ms(row["reaction_p99_s"]))
+             _ms(row["reaction_p99_s"]), _ms(row["shown_p99_s"]))
             for row in result["rows"]
         ),
     )  # fmt: skip

@@ -82,6 +82,7 @@ class Result:
         sentence: The reason with what was seen.
         reaction: From the first bad answer to the first safe command, s; None without either.
         braked: From the host's death until the drives brake, s.
+        shown: How long a false torque or velocity showed before the stop, s.
         disturbed: Whether the run ended safely, but because the computer was too slow for it: such
             a trial in real time tells nothing.
         problems: What was unsafe or wrong; empty if all is well.
@@ -93,6 +94,7 @@ class Result:
     sentence: str = ""
     reaction: float | None = None
     braked: float | None = None
+    shown: float | None = None
     disturbed: bool = False
     problems: list[str] = field(default_factory=list)
 

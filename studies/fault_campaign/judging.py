@@ -15,6 +15,7 @@ from hopping_leg.deploy.hardware_trials import Performance
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.errors import TraceError
 from hopping_leg.robot.parameters import JOINTS
+from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.trace import Trace
 from studies.fault_campaign.case import Result, Scene
 from studies.fault_campaign.families import Family
@@ -27,6 +28,9 @@ BRAKED_WITHIN = 0.025
 FAR, LIED_WITHIN = 0.05, 0.05
 """Difference of a joint's angle from what its drive says that matters, rad; time for which the
 drives may be powered after that, s."""
+
+SHOWS = {"torque_false": ("sent_nm", 2.0), "velocity_false": ("velocity_rad_s", 1.0)}
+"""From which value of a column on a kind of lie shows: torque sent, N m, and speed said, rad/s."""
 
 PUSHED = 0.1
 """Share of its largest torque from which on a joint counts as pushed."""
@@ -73,6 +77,13 @@ def judge_truth(result: Result, scene: Scene, log: WireLog, truth: Array, trace:
     off = [told.time for told in log.commands if told.mode in SAFE and told.time >= result.began]
     until = min(off, default=math.inf)
     said_at = trace.column("time_s") + time[0]
+    for fault in (scene.mishap.fault, scene.mishap.second):
+        if fault is not None and fault.kind in SHOWS:
+            joints = JOINTS if fault.drive == "both" else (fault.drive,)
+            column, least = SHOWS[fault.kind]
+            values = np.abs([trace.column(f"{name}_{column}") for name in joints]).max(axis=0)
+            lying = (said_at >= result.began) & (said_at <= until)
+            result.shown = float((lying & (values >= least)).sum() / CONTROL_RATE)
     for joint, name in enumerate(JOINTS):
         model = getattr(scene.robot, name)
         said = trace.column(f"{name}_position_rad")
