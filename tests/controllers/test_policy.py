@@ -5,15 +5,12 @@ import logging
 import numpy as np
 import onnx
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from onnx import TensorProto, helper
 
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller, load_policy
 from hopping_leg.errors import PolicyError, UsageError
 from hopping_leg.robot import load_robot
-from hopping_leg.sim.channel import Measurement
 from tests.controllers.measurements import measurement
 from tests.rl.test_onnx_export import made, parts
 
@@ -89,43 +86,6 @@ def test_another_robot_is_refused_or_named(tmp_path, caplog):
     assert not caplog.text
     with pytest.raises(PolicyError, match="400 Hz"):
         load_policy(path).check_robot(ROBOT, 400.0)
-
-
-def stream(ticks, seed):
-    """Return measurements of four legs, some of them late."""
-    rng = np.random.default_rng(seed)
-    for _ in range(ticks):
-        q, qd = rng.normal(size=(2, 4, 3, 2))
-        age = np.sort(rng.permuted(np.tile(np.arange(10), (4, 1)), axis=1)[:, :3]) * 0.005
-        yield Measurement(q, qd, rng.uniform(0.22, 0.4, (4, 3)), age)
-
-
-@pytest.mark.parametrize("layout", ["three-samples", "dated"])
-@settings(max_examples=10)
-@given(
-    rows=st.lists(st.integers(0, 3), unique=True, max_size=4),
-    mask=st.booleans(),
-    before=st.integers(0, 12),
-    seed=st.integers(0, 99),
-)
-def test_a_forgotten_leg_acts_as_from_a_fresh_start_and_others_go_on(
-    layout, rows, mask, before, seed
-):
-    told, untold, fresh = policies = [
-        Policy(made(layout, "gru"), "memory", "test") for _ in range(3)
-    ]
-    for policy in policies:
-        policy.reset(4)
-    seen = list(stream(before + 5, seed))
-    for m in seen[:before]:
-        untold.act(m)
-        told.act(m)[:] = np.nan  # what it returned is the caller's
-    forgotten = np.isin(np.arange(4), rows)
-    told.reset(forgotten if mask else np.array(rows, int))
-    for m in seen[before:]:
-        as_told, as_fresh, as_untold = (p.act(m) for p in (told, fresh, untold))
-        np.testing.assert_array_equal(as_told[forgotten], as_fresh[forgotten])
-        np.testing.assert_array_equal(as_told[~forgotten], as_untold[~forgotten])
 
 
 @pytest.mark.parametrize("command", [0.1, 0.5, np.nan])

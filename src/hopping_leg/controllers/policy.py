@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from hopping_leg.arrays import Array, BoolArray, IntArray
+from hopping_leg.arrays import Array
 from hopping_leg.controllers.observation_history import (
     AnyLeg,
     ObservationHistory,
@@ -266,31 +266,11 @@ class Policy:
             f" '{robot.name}' ({robot.digest})."
         )
 
-    def reset(self, count: int | IntArray | BoolArray) -> None:
-        """Forget everything, the next measurement has ``count`` rows; or forget single legs.
-
-        Those are named by an array of their rows, or a mask, and begin anew with the next
-        measurement; all others go on.
-
-        Raises:
-            UsageError: There are no such rows.
-        """
-        if isinstance(count, int | np.integer):
-            self._layout.reset(int(count))
-            self._forgotten: IntArray = np.arange(0)
-            self._torque = np.zeros((count, 2))
-            self._memory = np.zeros((count, self._memory_size), np.float32)
-            return
-        try:
-            rows = np.arange(len(self._torque))[np.asarray(count)]
-        except IndexError as error:
-            raise UsageError(
-                f"{self.name} controls {len(self._torque)} legs and cannot forget {count}; name"
-                " rows of these, or mask them."
-            ) from error
-        self._torque[rows], self._memory = 0.0, self._memory.copy()
-        self._memory[rows] = 0.0
-        self._forgotten = np.union1d(self._forgotten, rows)
+    def reset(self, count: int) -> None:
+        """Forget everything; the next measurement has ``count`` rows."""
+        self._layout.reset(count)
+        self._torque = np.zeros((count, 2))
+        self._memory = np.zeros((count, self._memory_size), np.float32)
 
     def act(self, measurement: Measurement) -> Array:
         """Return joint torques, N m, (n, 2).
@@ -306,9 +286,6 @@ class Policy:
                 f" {newest[~fits][0]:g} m."
             )
         self._layout.update(measurement, self._torque)
-        if len(self._forgotten):
-            self._layout.restart(self._forgotten, measurement)
-            self._forgotten = np.arange(0)
         feeds = self._layout.inputs()
         if self._memory_size:
             feeds[MEMORY] = self._memory

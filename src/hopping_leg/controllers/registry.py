@@ -38,11 +38,6 @@ def shipped_policies() -> list[str]:
     )
 
 
-def shipped_card(name: str) -> str:
-    """Return the model card of a shipped policy, Markdown."""
-    return (_SHIPPED / f"{name}.md").read_text(encoding="utf-8")
-
-
 def controller_names() -> list[str]:
     """Return every name that ``load_controller`` knows."""
     return [*_BUILT_IN, *shipped_policies()]
