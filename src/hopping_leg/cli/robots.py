@@ -11,7 +11,6 @@ Examples:
   hop robots draw twins --count 20 --out runs/twins
 """
 
-import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -21,9 +20,8 @@ import tyro
 from hopping_leg.cli.options import at_least, save_json, say, say_next, show_table
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically
-from hopping_leg.robot import Robot, build_model, numbers, robot_files
-from hopping_leg.robot.importing import imported_robot, known_numbers
-from hopping_leg.robot.importing.leg_parts import Names
+from hopping_leg.robot import Robot, build_model, importing, numbers, robot_files
+from hopping_leg.robot.planar_leg import Names, read_leg
 
 Target = tyro.conf.Positional[str]
 
@@ -58,15 +56,12 @@ class Check:
 class Import:
     """Make a robot file of a leg's URDF or MJCF, e.g. `hop robots import leg.urdf --motor qdd100`.
 
-    Meshes are not read. What the file does not say is asked for on a terminal, else assumed and
-    listed; every number in the robot file says where it comes from.
+    Meshes are not read. What the file does not say is assumed and listed, or asked for by its name;
+    every number in the robot file says where it comes from.
     """
 
     description: tyro.conf.Positional[Path]
     """The URDF or MJCF file."""
-    base: str | None = None
-    """Body that slides on the rail; default: what the vertical slide above the hip moves, else all
-    above the hip."""
     hip: str | None = None
     """Hip's joint; default: found by structure and usual names."""
     knee: str | None = None
@@ -146,13 +141,9 @@ def _import(args: Import) -> None:
     out = args.out or Path(f"{args.description.stem}.toml")
     if out.exists():
         raise UsageError(f"{out} exists and is not replaced; remove it, or give another --out.")
-    values = imported_robot.read_values(args.set)
-    names = Names(args.base, args.hip, args.knee, args.foot)
-    leg = imported_robot.read_leg(args.description, names)
-    asks = sys.stdin.isatty() and sys.stdout.isatty()
-    motors = args.motor or (_ask_motors() if asks else ())
-    given = known_numbers.Given(motors, values)
-    made = imported_robot.imported_robot(leg, given, str(args.description), _ask if asks else None)
+    values = importing.read_values(args.set)
+    leg = read_leg(args.description, Names(args.hip, args.knee, args.foot))
+    made = importing.imported_robot(leg, str(args.description), args.motor, values)
     robot = robot_files.robot_from_tree(made.tree, str(out))
     build_model(robot)
     write_atomically(out, robot_files.robot_text(made.tree, made.comment).encode())
@@ -172,31 +163,6 @@ def _import(args: Import) -> None:
         ["hop", "view", "universal", "--robot", out],
         ["hop", "evaluate", "universal", "energy-shaping", "--robot", out],
     )
-
-
-def _ask_motors() -> tuple[str, ...]:
-    valid = ", ".join(known_numbers.MOTORS)
-    words = input(f"Motor of both joints, or hip's and knee's ({valid}; Enter: another): ")
-    return tuple(words.replace(",", " ").split())
-
-
-_ASKED = ("belt_ratio", "torque_limit", "rail.friction", "contact.time_constant")
-"""Ends of the paths of numbers that are asked for though they could be assumed."""
-
-
-def _ask(path: str, unit: str, assumed: float | None) -> float | None:
-    """Ask for a number; Enter takes what would be assumed, if anything would."""
-    if assumed is not None and not path.endswith(_ASKED):
-        return assumed
-    usual = "" if assumed is None else f" [{assumed:g}]"
-    while True:
-        answer = input(f"{path}, {unit}{usual}: ").strip()
-        if not answer:
-            return assumed
-        try:
-            return float(answer)
-        except ValueError:
-            say(f"'{answer}' is no number; give one in {unit}, or press Enter.")
 
 
 def derived(robot: Robot) -> dict[str, Any]:

@@ -4,7 +4,7 @@ URDF knows neither a motor's reflected inertia nor its torque-speed limit: the f
 file as Drake reads it, ``drake:rotor_inertia`` times ``drake:gear_ratio`` squared; for the latter a
 joint's ``velocity`` is the speed at which its motor has no torque left. A joint's ``limit`` are its
 mechanical stops, its ``safety_controller`` has the soft limits, all at the joint's side of the
-belt. Reading it back, ``hopping_leg.robot.importing`` leaves the transmissions out.
+belt. Reading it back, ``hopping_leg.robot.planar_leg`` leaves the transmissions out.
 """
 
 from xml.etree import ElementTree as Xml

@@ -63,10 +63,8 @@ def urdf(robot: Robot, how: Conventions) -> str:
             root, f"{name}_joint", "revolute", parts[1], name, parts[0], pose, sign * normal
         )
         ends = sorted(sign * (stop - zero) for stop in (joint.stop_lower, joint.stop_upper))
-        soft = sorted(sign * (stop - zero) for stop in (joint.lower, joint.upper))
         facts = {
             "limit": {"lower": ends[0], "upper": ends[1], "effort": 20.0, "velocity": 30.0},
-            "safety_controller": {"soft_lower_limit": soft[0], "soft_upper_limit": soft[1]},
             "dynamics": {"friction": joint.friction, "damping": joint.damping},
         }
         for tag, values in facts.items():

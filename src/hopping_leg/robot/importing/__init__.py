@@ -1,1 +1,0 @@
-"""A leg that somebody described as URDF or MJCF, read into this package's planar robot."""

@@ -1,0 +1,291 @@
+"""The planar leg in a URDF or MJCF file, in this package's convention.
+
+Hip and knee are two hinges with parallel axes, one the next above the other; where several pairs
+are, usual names decide. The base is what the vertical slide above the hip moves. Bodies between
+these joints are one rigid lump each; other joints are held in the zero posture.
+
+In the leg's plane, with d down and f forward, the links at zero point along (cos a, sin a); the
+package's angle of a joint is sign (u - u0) + a, with u the file's coordinate, u0 that of the zero
+posture and a the thigh's direction, or the shank's against the thigh's. The knee bends to the
+negative side: that decides which way is forward.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.errors import RobotError, unknown_name
+from hopping_leg.robot.description import Description, Point
+
+Entry = tuple[float, str]
+"""A number and its source."""
+
+_HIP = re.compile(r"hip|shoulder|thigh|upper|femur", re.IGNORECASE)
+_KNEE = re.compile(r"knee|elbow|shank|calf|lower|tibia", re.IGNORECASE)
+_FOOT = re.compile(r"foot|toe|tip|(^|[_-])ee($|[_-])|end_?effector", re.IGNORECASE)
+
+_HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
+_TURN = 2 * np.pi
+_PARALLEL = 0.02  # sine of the angle up to which two directions are one
+_SAME_PLACE = 2e-3  # m, up to which two points are one
+_BENT = 0.1  # rad, beyond which a range or a posture tells to which side a knee bends
+
+
+@dataclass(frozen=True)
+class Names:
+    """What the parts are called in the file; None finds them by structure and usual names."""
+
+    hip: str | None = None
+    """Joint."""
+    knee: str | None = None
+    """Joint."""
+    foot: str | None = None
+    """Body, site or geom at the centre of the foot's sphere."""
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """The joints of a leg, the bodies between them, and its foot, by their numbers in a file."""
+
+    hip: int
+    knee: int
+    rail: int | None
+    base: set[int]
+    thigh: set[int]
+    shank: set[int]
+    foot: Point
+
+
+@dataclass(frozen=True)
+class PlanarLeg:
+    """What a file says of a leg."""
+
+    name: str
+    numbers: dict[str, Entry]
+    """By their path in a robot file, and ``hip.effort``, N m, ``hip.velocity``, rad/s, and the
+    knee's, at the joint; as far as the file states them."""
+    angles: dict[str, str]
+    """Hip's and knee's angle by the file's coordinates."""
+    notes: list[str]
+    """Sentences about what the file has and is not read."""
+
+
+def read_leg(path: Path, names: Names) -> PlanarLeg:
+    """Return the leg that a URDF or MJCF file describes.
+
+    Raises:
+        RobotError: The file cannot be read, a part is missing or ambiguous, or the leg moves in no
+            vertical plane.
+    """
+    tree = Description(path)
+    data, parts = tree.data, _parts(tree, names)
+    ends = np.stack([data.xanchor[parts.hip], data.xanchor[parts.knee], parts.foot.position])
+    normal, flat = _plane(tree, parts, ends)
+    lines = np.diff(ends, axis=0) @ flat.T
+    thigh, shank = map(float, np.arctan2(lines[:, 1], lines[:, 0]))
+    hip, hip_angle = _joint(tree, parts.hip, normal, thigh, -np.pi)
+    knee, knee_angle = _joint(tree, parts.knee, normal, shank - thigh, -1.5 * np.pi)
+    base = tree.heavy(parts.base)
+    spheres = [point for point in tree.points(parts.shank) if point.radius > 0]
+    around = [s for s in spheres if _aside(tree, parts.hip, s.position - ends[2]) < _SAME_PLACE]
+    found: dict[str, dict[str, Entry]] = {
+        "base": {"mass": (float(tree.model.body_mass[base].sum()), _said(tree, base))},
+        "rail": {} if parts.rail is None else _losses(tree, parts.rail),
+        "hip": hip,
+        "knee": knee,
+        "thigh": _link(tree, parts.thigh, ends[0], lines[0], normal, flat),
+        "shank": _link(tree, parts.shank, ends[1], lines[1], normal, flat),
+        "foot": {"radius": (around[0].radius, f"sphere of {around[0].name}")} if around else {},
+    }
+    own = (parts.hip, parts.knee, parts.rail)
+    moving = parts.base | parts.thigh | parts.shank
+    joints = [i for i in range(tree.model.njnt) if tree.model.jnt_bodyid[i] in moving]
+    held = ", ".join(tree.joint(i) for i in joints if i not in own)
+    notes = [f"{tree.loops} equality constraints are left out."] if tree.loops else []
+    notes += [f"Joints held in the zero posture: {held}."] if held else []
+    numbers = {
+        f"{part}.{key}": (value, f"{path.name}, {source}")
+        for part, entries in found.items()
+        for key, (value, source) in entries.items()
+        if value > 0 or "stop" in key
+    }
+    return PlanarLeg(tree.name, numbers, {"hip": hip_angle, "knee": knee_angle}, notes)
+
+
+def _parts(tree: Description, names: Names) -> _Parts:
+    """Return a leg's parts, the base's bodies without the leg's."""
+    hip, knee = _hip_and_knee(tree, names)
+    if abs(tree.data.xaxis[hip] @ tree.up) > _PARALLEL:
+        raise RobotError(
+            f"{tree.origin}: the axis of '{tree.joint(hip)}' is not level, so that the leg leaves"
+            " its vertical plane; turn the file's root, or name another --hip."
+        )
+    slides = tree.above(hip, _SLIDE)
+    vertical = (i for i in slides if abs(tree.data.xaxis[i] @ tree.up) > 1 - _PARALLEL)
+    rail = next(vertical, None)
+    top = 0 if rail is None else tree.model.jnt_bodyid[rail]
+    leg, shank = (tree.subtree(tree.model.jnt_bodyid[joint]) for joint in (hip, knee))
+    foot = _foot(tree, names, shank, knee)
+    return _Parts(hip, knee, rail, tree.subtree(top) - leg, leg - shank, shank, foot)
+
+
+def _find(tree: Description, option: str, kind: str, name: str, valid: Mapping[str, int]) -> int:
+    """Return what a name of the user stands for."""
+    if name not in valid:
+        raise RobotError(f"{tree.origin}: --{option}: {unknown_name(kind, name, valid)}")
+    return valid[name]
+
+
+def _hip_and_knee(tree: Description, names: Names) -> tuple[int, int]:
+    """Return the two joints: a hinge and the next one below it, with parallel axes."""
+    joints, axis = range(tree.model.njnt), tree.data.xaxis
+    hinges = {tree.joint(i): i for i in joints if tree.model.jnt_type[i] == _HINGE}
+    wanted = {
+        option: _find(tree, option, "hinge", name, hinges)
+        for option in ("hip", "knee")
+        if (name := getattr(names, option)) is not None
+    }
+    pairs = []
+    for knee in [wanted["knee"]] if "knee" in wanted else hinges.values():
+        above = tree.above(knee, _HINGE)
+        hip = next((i for i in above if wanted.get("hip", i) == i), None)
+        if hip is not None and np.linalg.norm(np.cross(axis[hip], axis[knee])) < _PARALLEL:
+            pairs.append((hip, knee))
+    for pattern, place in ((_KNEE, 1), (_HIP, 0)):
+        likely = [pair for pair in pairs if pattern.search(tree.joint(pair[place]))]
+        pairs = likely if len(pairs) > 1 and likely else pairs
+    if len(pairs) == 1:
+        return pairs[0]
+    found = ", ".join(f"'{name}'" for name in hinges) or "none"
+    what = "has several pairs that may be hip and knee" if pairs else "has no knee below a hip"
+    raise RobotError(
+        f"{tree.origin} {what} (two hinges with parallel axes, one moved by the other); its hinges"
+        f" are: {found}. Name them with --hip and --knee."
+    )
+
+
+def _foot(tree: Description, names: Names, shank: set[int], knee: int) -> Point:
+    """Return the foot's centre: the point of that name, else of a usual one, else a sphere."""
+    points = tree.points(shank)
+    likely = [point for point in points if _FOOT.search(point.name)] or points
+    if names.foot is not None:
+        known = {point.name: i for i, point in enumerate(points)}
+        _find(tree, "foot", "point below the knee", names.foot, known)
+        likely = [point for point in points if point.name == names.foot]
+
+    def far(point: Point) -> float:
+        return _aside(tree, knee, point.position - tree.data.xanchor[knee])
+
+    candidates = [point for point in likely if far(point) > _SAME_PLACE]
+    foot = max(candidates, key=lambda point: (point.radius > 0, far(point)), default=None)
+    if foot is None:
+        found = ", ".join(sorted({point.name for point in points}))
+        raise RobotError(
+            f"{tree.origin} does not say where the foot is: below the knee stand {found}; name the"
+            " centre of its sphere with --foot, or add a frame there (in URDF a link 'foot' on a"
+            " fixed joint, in MJCF a site)."
+        )
+    return foot
+
+
+def _aside(tree: Description, joint: int, vector: Array) -> float:
+    """Return a vector's length across a joint's axis."""
+    return float(np.linalg.norm(np.cross(vector, tree.data.xaxis[joint])))
+
+
+def _plane(tree: Description, parts: _Parts, ends: Array) -> tuple[Array, Array]:
+    """Return the axis about which positive turns swing forward, and down and forward as rows.
+
+    Of the two ways forward it is that to which the knee sticks out.
+    """
+    axis = tree.data.xaxis[parts.hip]
+    level = axis - (axis @ tree.up) * tree.up
+    normal = level / np.linalg.norm(level)
+    forward = np.cross(tree.up, normal)
+    if forward[np.argmax(np.abs(forward))] < 0:
+        normal, forward = -normal, -forward
+    lines = np.diff(ends, axis=0)
+    thigh, shank = np.arctan2(lines @ forward, -lines @ tree.up)
+    bend = _wrapped(shank - thigh)
+    stops = _stops(tree, parts.knee)
+    if stops is not None and stops[1] < stops[0] + _TURN:
+        sign = float(np.sign(tree.data.xaxis[parts.knee] @ normal))
+        middle = _wrapped(sign * sum(stops) / 2 + bend)
+        bend = middle if abs(middle) > _BENT else bend
+    if bend > _BENT:
+        normal, forward = -normal, -forward
+    return normal, np.stack([-tree.up, forward])
+
+
+def _wrapped(angle: float) -> float:
+    """Return an angle between -pi and pi."""
+    return float((angle + np.pi) % _TURN - np.pi)
+
+
+def _stops(tree: Description, joint: int) -> tuple[float, float] | None:
+    """Return where a joint ends against the zero posture, rad, None if nowhere within a turn."""
+    low, high = (float(end) - tree.zero(joint) for end in tree.model.jnt_range[joint])
+    limited = tree.model.jnt_limited[joint] and -_TURN <= low < high <= _TURN
+    return (low, high) if limited else None
+
+
+def _losses(tree: Description, joint: int) -> dict[str, Entry]:
+    """Return a joint's friction and damping."""
+    return {key: (v, f"joint {tree.joint(joint)}") for key, v in tree.losses(joint).items()}
+
+
+def _joint(
+    tree: Description, joint: int, normal: Array, direction: float, least: float
+) -> tuple[dict[str, Entry], str]:
+    """Return what is stated of a joint, and the package's angle by the file's coordinate.
+
+    The middle between the stops lies within a turn from ``least``.
+    """
+    sign = 1 if tree.data.xaxis[joint] @ normal > 0 else -1
+    name, zero, offset = tree.joint(joint), tree.zero(joint), round(_wrapped(direction), 12)
+    entries = _losses(tree, joint)
+    entries |= {key: (v, f"joint {name}, {key}") for key, v in tree.drive(joint).items()}
+    if (stops := _stops(tree, joint)) is not None:
+        offset -= _TURN * float(np.floor((sign * sum(stops) / 2 + offset - least) / _TURN))
+        ends = sorted(sign * end + offset for end in stops)
+        for key, end in zip(("stop_lower", "stop_upper"), ends, strict=True):
+            entries[key] = end, f"joint {name}"
+    coordinate = f"({name} - {zero:.6g})" if zero else name
+    added = f" {'-' if offset < 0 else '+'} {abs(offset):.6g} rad" if offset else ""
+    return entries, f"{'' if sign > 0 else '-'}{coordinate}{added}"
+
+
+def _link(
+    tree: Description, lump: set[int], joint: Array, line: Array, normal: Array, flat: Array
+) -> dict[str, Entry]:
+    """Return bodies as a link along ``line`` from its upper joint.
+
+    The inertia is such that the one about the joint is kept.
+    """
+    model, data, bodies = tree.model, tree.data, tree.heavy(lump)
+    length = float(np.linalg.norm(line))
+    if not bodies:
+        return {"length": (length, "between the joints")}
+    masses, coms = model.body_mass[bodies], (data.xipos[bodies] - joint) @ flat.T
+    mass = float(masses.sum())
+    com = masses @ coms / mass
+    across = np.einsum("bij,i->bj", data.ximat[bodies].reshape(-1, 3, 3), normal)
+    own = np.sum(tree.inertia[bodies] * across**2) + masses @ np.sum((coms - com) ** 2, axis=1)
+    along, beside = float(com @ line) / length, float(com @ [-line[1], line[0]]) / length
+    said = _said(tree, bodies)
+    left = f"; {1e3 * abs(beside):.2g} mm beside the line are left out"
+    return {
+        "length": (length, "between the joints"),
+        "mass": (mass, said),
+        "com": (along, f"{said}, along the link{left if abs(beside) > 1e-6 else ''}"),
+        "inertia": (float(own) + mass * beside**2, f"{said}, about the centre of mass"),
+    }
+
+
+def _said(tree: Description, bodies: list[int]) -> str:
+    return " + ".join(tree.body(i) for i in bodies)
