@@ -6,6 +6,7 @@ noise and delay. An interrupted search goes on where it was: call it again with 
 
 import dataclasses
 import itertools
+import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,10 +25,10 @@ from hopping_leg.controllers.energy_shaping.gains import (
     GainFile,
     ShapingGains,
     load_gains,
-    save_gains,
     scale_gains,
 )
 from hopping_leg.errors import UsageError
+from hopping_leg.io import write_atomically
 from hopping_leg.robot import DEFAULT_ROBOT, load_robot
 from studies.shared import Row, main, once
 
@@ -82,6 +83,14 @@ def from_unit(point: Array, base: ShapingGains) -> ShapingGains:
     """Return ``base`` with the searched gains of a point in the unit cube."""
     values = _LOW + np.clip(point, 0.0, 1.0) * (_HIGH - _LOW)
     return dataclasses.replace(base, **dict(zip(SPACE, values.tolist(), strict=True)))
+
+
+def save_gains(path: Path, found: GainFile) -> None:
+    """Write a tuned set; an existing file is replaced only once the new one is complete."""
+    # A JSON string is a TOML one.
+    lines = [f"robot = {json.dumps(found.robot)}", f"source = {json.dumps(found.source)}", ""]
+    lines += ["[gains]", *(f"{name} = {float(v)!r}" for name, v in vars(found.gains).items())]
+    write_atomically(path, ("\n".join(lines) + "\n").encode())
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from hopping_leg.controllers.energy_shaping.gains import (
     GainFile,
     ShapingGains,
     load_gains,
-    save_gains,
     scale_gains,
 )
 from hopping_leg.errors import UsageError
@@ -143,7 +142,7 @@ def test_the_command_writes_gains_that_say_how_they_were_found(tmp_path):
 
 def test_gains_survive_a_file_and_a_bad_one_is_named(tmp_path):
     stored = GainFile("legv2", 'a "quoted" search', ShapingGains(k0=1.25, exponent=0.5))
-    save_gains(tmp_path / "g.toml", stored)
+    tune.save_gains(tmp_path / "g.toml", stored)
     assert load_gains(tmp_path / "g.toml") == stored
     (tmp_path / "g.toml").write_text('robot = "a"\nsource = "b"\n[gains]\nk_0 = 1.0')
     for name, said in (("g.toml", "g.toml.*k_0"), ("missing.toml", r"energy_shaping\.tune")):

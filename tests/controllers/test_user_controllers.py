@@ -148,9 +148,9 @@ def test_a_trace_keeps_its_own_columns(tmp_path):
 
 def test_an_edited_file_is_another_controller(tmp_path):
     path = written(tmp_path / "mine.py", BATCHED, answer="np.zeros((self.count, 2))")
-    before, same = (type(load_controller(f"{path}:Held", ROBOT)).__qualname__ for _ in range(2))
+    before, same = (load_controller(f"{path}:Held", ROBOT).digest for _ in range(2))
     written(path, BATCHED, answer="np.ones((self.count, 2))")
-    assert before == same != type(load_controller(f"{path}:Held", ROBOT)).__qualname__
+    assert before == same != load_controller(f"{path}:Held", ROBOT).digest
 
 
 def test_other_names_are_no_classes():

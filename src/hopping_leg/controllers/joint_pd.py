@@ -60,10 +60,6 @@ class JointPD:
             )
         self.position = position
         self.velocity = np.zeros_like(position) if velocity is None else velocity
-        if self.velocity.shape != position.shape:
-            raise UsageError(
-                f"Joint velocities are {self.velocity.shape} but the positions {position.shape}."
-            )
         gains = gains or JointGains()
         self._stiffness, self._damping = np.array(gains.stiffness), np.array(gains.damping)
         self.name = "joint-pd"

@@ -159,14 +159,13 @@ class Card:
         Raises:
             PolicyError: It is of another schema, incomplete or damaged.
         """
-        try:
-            values = parse_json(text, "it", PolicyError)
-            schema = values.pop("schema", None)
-            if schema != SCHEMA:
-                raise PolicyError(f"it is of schema {schema}; this version reads schema {SCHEMA}.")
-            return read_dataclass(Card, values, "it", error=PolicyError)
-        except PolicyError as error:
-            raise PolicyError(f"{origin} has a damaged policy card: {error}") from error
+        origin = f"The card of {origin}"
+        values = parse_json(text, origin, PolicyError)
+        if (schema := values.pop("schema", None)) != SCHEMA:
+            raise PolicyError(
+                f"{origin} is of schema {schema}; this version reads schema {SCHEMA}."
+            )
+        return read_dataclass(Card, values, origin, error=PolicyError)
 
 
 class Policy:
@@ -232,16 +231,14 @@ class Policy:
         if self.for_any_leg:
             self.scale = robot.size
 
-    def check_robot(
-        self, robot: Robot, rate: float | None = None, *, other: OtherRobot = "refuse"
-    ) -> None:
+    def check_robot(self, robot: Robot, rate: float, *, other: OtherRobot = "refuse") -> None:
         """Tell the policy its robot, and make sure that it was trained for that and the rate, Hz.
 
         Raises:
             PolicyError: The rate differs, or the robot where that is refused.
         """
         trained = self.card.rate
-        if rate is not None and rate != trained:
+        if rate != trained:
             raise PolicyError(
                 f"{self.origin} was trained at {trained:g} Hz and cannot run at {rate:g} Hz;"
                 f" set --rate {trained:g}."

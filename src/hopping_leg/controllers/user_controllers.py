@@ -13,11 +13,9 @@ import contextlib
 import hashlib
 import importlib
 import importlib.util
-import inspect
 import sys
 import traceback
 from collections.abc import Callable, Iterator
-from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -57,10 +55,13 @@ class SingleLeg:
 
 
 class UserController:
-    """Guards a controller of someone else, named ``origin``; implements ``Controller``."""
+    """Guards a controller of someone else, named ``origin``; implements ``Controller``.
 
-    def __init__(self, controller: Any, origin: str, name: object = None) -> None:  # noqa: ANN401
-        self.controller, self.origin, self._count = controller, origin, 0
+    ``digest`` tells it from others of its name.
+    """
+
+    def __init__(self, controller: Any, origin: str, name: object, digest: str) -> None:  # noqa: ANN401
+        self.controller, self.origin, self.digest, self._count = controller, origin, digest, 0
         self.name = (name if isinstance(name, str) else origin).rpartition(":")[2]
 
     def reset(self, count: int) -> None:
@@ -130,13 +131,9 @@ def load_user_controller(name: str, robot: Robot, rate: float) -> UserController
             f"'{name}' is no controller, which has the methods 'reset' and 'act', or '{METHOD}' for"
             " a single leg."
         )
-    # Kept results tell controllers apart by class: with the digest in its name, an edited file is
-    # judged anew.
     file = getattr(module, "__file__", None)
     content = Path(file).read_bytes() if file else module.__name__.encode()
-    kind_name = f"UserController_{hashlib.sha256(content).hexdigest()[:16]}"
-    made: UserController = type(kind_name, (UserController,), {})(controller, name, named)
-    return made
+    return UserController(controller, name, named, hashlib.sha256(content).hexdigest()[:16])
 
 
 def load_user_object(name: str) -> Any:  # noqa: ANN401
@@ -153,26 +150,24 @@ def _find(name: str) -> tuple[ModuleType, Any]:
     source, _, wanted = name.rpartition(":")
     if name.endswith(".py"):
         source, wanted = name, ""
-    load = _load_file if source.endswith(".py") else importlib.import_module
     with guarded(source, "could not be imported"):
-        module = load(source)
+        module = _load_file(source) if source.endswith(".py") else importlib.import_module(source)
     if not hasattr(module, wanted):
-        classes = inspect.getmembers(module, inspect.isclass)
-        known = [n for n, kind in classes if kind.__module__ == module.__name__]
+        kinds = [kind for kind in vars(module).values() if isinstance(kind, type)]
+        known = [kind.__name__ for kind in kinds if kind.__module__ == module.__name__]
         hint = "" if wanted else f" Write {source}:CLASS."
         raise ControllerError(f"In {source}: {unknown_name('class', wanted, known)}{hint}")
     return module, getattr(module, wanted)
 
 
 def _load_file(path: str) -> ModuleType:
-    content = Path(path).read_bytes()
     # A name of its own keeps files of equal names apart; dataclasses look their module up by it.
-    name = f"hopping_leg_user_file_{hashlib.sha256(content).hexdigest()[:16]}"
-    loader = SourceFileLoader(name, path)
-    spec = importlib.util.spec_from_loader(name, loader)
+    digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16]
+    spec = importlib.util.spec_from_file_location(f"hopping_leg_user_file_{digest}", path)
     assert spec is not None
-    sys.modules[name] = module = importlib.util.module_from_spec(spec)
-    loader.exec_module(module)
+    assert spec.loader is not None
+    sys.modules[spec.name] = module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
     return module
 
 

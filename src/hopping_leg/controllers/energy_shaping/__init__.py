@@ -7,7 +7,6 @@ from hopping_leg.controllers.energy_shaping.gains import (
     TUNED,
     ShapingGains,
     load_gains,
-    own_gains,
     scale_gains,
 )
 from hopping_leg.robot import Robot, load_robot
@@ -21,7 +20,7 @@ def tuned_energy_shaping(
 
     Shipped ones are those that were tuned on this very leg, if there are any.
     """
-    found = load_gains(own_gains(gains, robot))
+    found = load_gains(gains, robot)
     scaled = scale_gains(found.gains, load_robot(found.robot), robot)
     return EnergyShaping(robot, scaled, ROBUST, rate=rate, name=gains)
 

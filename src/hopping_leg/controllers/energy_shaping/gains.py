@@ -3,7 +3,6 @@
 A gain file is one TOML per tuned set, beside the leg it was found on.
 """
 
-import json
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
@@ -166,20 +165,16 @@ class GainFile:
     gains: ShapingGains
 
 
-def own_gains(name: str, robot: Robot) -> str:
-    """Return the name of the shipped set ``name`` that was tuned on a robot, else ``name``."""
-    own = f"{name}-{robot.name}"
-    return own if (_SHIPPED / f"{own}.toml").is_file() else name
-
-
-def load_gains(name_or_path: str | Path = TUNED) -> GainFile:
-    """Load a tuned set by shipped name or from a TOML file.
+def load_gains(name_or_path: str | Path = TUNED, robot: Robot | None = None) -> GainFile:
+    """Load a tuned set by shipped name, that of a robot if it has its own, or from a TOML file.
 
     Raises:
         UsageError: The file is missing or not a gain file; the message names the field.
     """
     name = str(name_or_path)
     source: Any = Path(name) if name.endswith(".toml") else _SHIPPED / f"{name}.toml"
+    own = _SHIPPED / f"{name}-{robot.name}.toml" if robot else source
+    source = own if own.is_file() else source
     try:
         content = source.read_bytes()
     except OSError as error:
@@ -191,11 +186,3 @@ def load_gains(name_or_path: str | Path = TUNED) -> GainFile:
     if "extends" in tree or "thigh" in tree:
         raise errors.UsageError(f"{name} is a robot file, no controller; give it with --robot.")
     return io.read_dataclass(GainFile, tree, name)
-
-
-def save_gains(path: Path, found: GainFile) -> None:
-    """Write a tuned set; an existing file is replaced only once the new one is complete."""
-    # A JSON string is a TOML one.
-    lines = [f"robot = {json.dumps(found.robot)}", f"source = {json.dumps(found.source)}", ""]
-    lines += ["[gains]", *(f"{name} = {float(v)!r}" for name, v in vars(found.gains).items())]
-    io.write_atomically(path, ("\n".join(lines) + "\n").encode())
