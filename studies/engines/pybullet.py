@@ -20,7 +20,7 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.errors import RobotError, UsageError
+from hopping_leg.errors import UsageError
 from hopping_leg.robot import GRAVITY, TIMESTEP, MotorLimit, Robot, to_urdf
 from hopping_leg.sim.simulator import CONTROL_RATE, Simulator
 
@@ -119,15 +119,7 @@ def pybullet_urdf(robot: Robot) -> str:
     """Return the URDF to be loaded with ``URDF_USE_INERTIA_FROM_FILE``.
 
     The fixed frame ``foot`` is left out, which nothing here asks for, and the rail is long.
-
-    Raises:
-        RobotError: The base is too light to give the rotor its mass.
     """
-    if robot.base.mass <= _ROTOR_MASS:
-        raise RobotError(
-            f"The base of {robot.name} weighs {robot.base.mass:g} kg but must weigh more than"
-            f" {_ROTOR_MASS:g} kg in PyBullet."
-        )
     base = dataclasses.replace(robot.base, mass=robot.base.mass - _ROTOR_MASS)
     inertia = robot.thigh.inertia + robot.hip.armature
     thigh = dataclasses.replace(robot.thigh, inertia=inertia)

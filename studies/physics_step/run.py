@@ -83,8 +83,6 @@ class PhysicsStep:
     """Runs per command."""
     duration: float = 10.0
     """Of a run, s."""
-    variants: bool = True
-    """Whether MuJoCo's other numbers are varied: energy shaping on the first robot at 0.25 ms."""
     seed: int = 0
     """Of noise and delay, the same at every step."""
     threads: int = 0
@@ -117,7 +115,7 @@ class PhysicsStep:
             "converged_timestep_s": converged(rows),
             "converged": converge,
             "rows": rows,
-            "variants": self._variants() if self.variants else [],
+            "variants": self._variants(),
             "repeats": self.repeats,
             "duration_s": self.duration,
         }
@@ -158,6 +156,7 @@ class PhysicsStep:
         return rows
 
     def _variants(self) -> list[Row]:
+        """Vary MuJoCo's other numbers: energy shaping on the first robot at 0.25 ms."""
         robot, found = load_robot(self.robots[0]), []
         base: list[Row] = []
         for name, edit in VARIANTS.items():

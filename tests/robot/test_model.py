@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.robot import (
     OVERSPEED,
     MotorLimit,
@@ -48,6 +49,13 @@ def test_a_motor_keeps_its_limits_whatever_it_is_asked_for_in_either_direction(t
     beyond = np.abs(qd) >= ROBOT.of_joints("no_load_speed")
     assert (given_torque[beyond & (torque * qd > 0)] == 0).all(), "it does not drive any faster"
     np.testing.assert_array_equal(MOTORS.clip(-torque, -qd), -given_torque)
+
+
+@given(pairs, pairs)
+def test_the_supervisor_knows_the_motors_by_the_same_line(torque, qd):
+    lines = hopping_limits(ROBOT, 200.0).motors
+    shares = [m.share(*seen) for m, seen in zip(lines, zip(torque, qd, strict=True), strict=True)]
+    np.testing.assert_allclose(shares * MOTORS.limit, MOTORS.clip(torque, qd), atol=1e-9)
 
 
 @given(pairs, pairs)
