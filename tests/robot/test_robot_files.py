@@ -176,7 +176,6 @@ def test_a_part_may_be_left_out_and_the_wiring_is_no_part_of_the_physics(tmp_pat
         ("hardware.knee.id", 1, "1", "both 1"),
         ("hardware.hip.id", 1.5, "1", "whole number"),
         ("hardware.hip.sign", 0.5, "1", "1 or -1"),
-        ("hardware.hip.lower", -2.0, "rad", "write it as 'hip.stop_lower'"),
         ("hardware.voltage_low", 50, "V", "voltage_high"),
         ("hardware.watchdog", 0, "s", "more than zero"),
     ],

@@ -9,7 +9,7 @@ import numpy as np
 from hopping_leg.errors import RobotError, unknown_name
 from hopping_leg.io import Tree
 from hopping_leg.robot.hardware import contradictions, speed_constant
-from hopping_leg.robot.model import GRAVITY, TIMESTEP
+from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.parameters import JOINTS, KINDS, Robot
 
 _REACH = [f"{joint}.{end}" for joint in JOINTS for end in ("lower", "upper")]
@@ -33,6 +33,7 @@ PLAUSIBLE: dict[str, tuple[float, float]] = {
     "length": (0.03, 1.0),
     "com": (5e-4, 1.0),
     "radius": (1e-3, 0.2),
+    "friction": (0.0, 20.0),
     "rotor_inertia": (1e-7, 5e-3),
     "armature": (1e-6, 0.5),
     "gear_ratio": (1.0, 200.0),
@@ -47,7 +48,6 @@ PLAUSIBLE: dict[str, tuple[float, float]] = {
 """Least and largest values, SI, that a leg on a rail may have, by the last part of the path."""
 _WIDEST = {"leg": 2 * math.pi, "pendulum": 12 * math.pi}
 """Largest joint limits, rad, by the robot's kind."""
-_HEAVIEST = 40.0  # kg, of a link per metre
 _CROSSWAYS = 1.2  # share of an inertia that the width of a link and its motor may add
 _LEAST_GYRATION = 0.05  # radius of gyration over length that a link hardly falls below
 _ARMATURES = (5e-3, 20.0)  # armature over what rotor, gear and belt reflect
@@ -77,30 +77,25 @@ def unfit_numbers(parent: Tree, child: Tree) -> dict[str, str]:
     }
 
 
-def doubts_of_inheritance(chain: list[tuple[str, Tree]], resolved: list[Tree]) -> Iterator[str]:
-    """Yield a sentence per file that inherits numbers which belonged to what it changes.
+def doubts_of_inheritance(name: str, own: Tree, origin: str, inherited: Tree) -> Iterator[str]:
+    """Yield a sentence per number of a file ``name`` to which inherited ones belonged.
 
-    ``chain`` are the files with their own tables, the root first, ``resolved`` all tables of each.
+    ``own`` are the file's tables, ``inherited`` all those of ``origin``, which it extends.
     """
-    for level, (name, own) in enumerate(chain[1:], 1):
-        stated_later = {path for _, tree in chain[level + 1 :] for path, _ in numbers(tree)}
-        unfit = unfit_numbers(resolved[level - 1], own)
-        unfit = {path: cause for path, cause in unfit.items() if path not in stated_later}
-        for cause in dict.fromkeys(unfit.values()):
-            belong = [path for path in unfit if unfit[path] == cause]
-            yield (
-                f"{name} changes {cause} but not {', '.join(belong)}, inherited from"
-                f" {chain[level - 1][0]}; state each anew, or as it is with your source (an"
-                " armature that is not stated is what rotor and gear give)."
-            )
+    unfit = unfit_numbers(inherited, own)
+    for cause in dict.fromkeys(unfit.values()):
+        belong = ", ".join(path for path in unfit if unfit[path] == cause)
+        yield (
+            f"{name} changes {cause} but not {belong}, inherited from {origin}; state each anew, or"
+            " as it is with your source (an armature that is not stated is what rotor and gear"
+            " give)."
+        )
 
 
 def doubts_of_values(robot: Robot, stated: Tree, origin: str) -> Iterator[str]:
-    """Yield sentences about numbers that are hardly right, or not ``stated``."""
-    limits = dict.fromkeys(
-        ("lower", "upper", "stop_lower", "stop_upper"), (-_WIDEST[robot.kind], _WIDEST[robot.kind])
-    )
-    plausible = {**PLAUSIBLE, **limits}
+    """Yield sentences about ``stated`` numbers of a robot that are hardly right."""
+    widest = _WIDEST[robot.kind]
+    plausible = {**PLAUSIBLE, "lower": (-widest, widest), "upper": (-widest, widest)}
     for path, entry in numbers(stated):
         low, high = plausible.get(path.rpartition(".")[2], (-math.inf, math.inf))
         if not path.startswith("reality."):
@@ -113,32 +108,18 @@ def doubts_of_values(robot: Robot, stated: Tree, origin: str) -> Iterator[str]:
         most = _CROSSWAYS * link.mass * (link.com + above) * reach
         least = link.mass * (_LEAST_GYRATION * link.length) ** 2
         if least < most:
-            remedy = f", or state '{name}.extent' where a weight sticks out"
-            yield from _beyond(
-                origin, f"{name}.inertia", link.inertia, least, most, "kg m2", remedy
-            )
-        yield from _beyond(origin, f"{name}.mass", link.mass, 0.0, _HEAVIEST * link.length, "kg")
+            why = f", or state '{name}.extent' where a weight sticks out"
+            yield from _beyond(origin, f"{name}.inertia", link.inertia, least, most, "kg m2", why)
     for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
         ratio = joint.motor.gear_ratio * joint.belt_ratio
         low, high = (share * joint.motor.rotor_inertia * ratio**2 for share in _ARMATURES)
         why = "; rotor, gear and belt reflect about that"
         yield from _beyond(origin, f"{name}.armature", joint.armature, low, high, "kg m2", why)
-        why = "; the motor gives no more torque"
-        for path, torque in (
-            (f"{name}.friction", joint.friction),
-            (f"{name}.damping", joint.damping * joint.no_load_speed),
-        ):
-            yield from _beyond(origin, path, torque, 0.0, joint.torque_limit, "N m", why)
-    weight, why = robot.mass * GRAVITY, "; the leg would hang on the rail"
-    yield from _beyond(origin, "rail.friction", robot.rail.friction, 0.0, weight, "N", why)
     if robot.kind == "leg" and not _stands(robot):
         yield (
             f"{origin}: within 'hip.lower' to 'knee.upper' the foot never comes below the hip; is a"
             " joint's sign wrong, or does the knee bend forward?"
         )
-    missing = sorted(_STOPS - {path for path, _ in numbers(stated)})
-    if missing and robot.kind == "leg":
-        yield f"{origin} does not state {', '.join(missing)}; leg V2's mechanical stops are taken."
 
 
 def _beyond(

@@ -16,7 +16,6 @@ from hopping_leg.robot.robot_checks import (
     check_physics,
     doubts_of_inheritance,
     doubts_of_values,
-    numbers,
     unfit_numbers,
 )
 
@@ -62,13 +61,6 @@ def robot_from_tree(tree: Tree, origin: str) -> Robot:
         RobotError: Naming origin, field and what was valid.
     """
     resolved = _resolve(_chain(tree, origin))[-1]
-    for path in (path for path, _ in numbers(resolved) if path.startswith("hardware.")):
-        if path.endswith((".lower", ".upper")):
-            new = path.removeprefix("hardware.").replace(".", ".stop_")
-            raise RobotError(
-                f"{origin}: '{path}' is a mechanical stop, which belongs to the joint; write it as"
-                f" '{new}'."
-            )
     robot = read_dataclass(Robot, _with_values(Robot, resolved, origin), origin, error=RobotError)
     if not robot.name.strip():
         raise RobotError(f"{origin}: 'name' is empty; give the robot a name.")
@@ -106,8 +98,9 @@ def doubts(name_or_path: str | Path) -> list[str]:
     origin = str(name_or_path)
     chain = _chain(_read(origin), origin)
     resolved = _resolve(chain)
-    robot = robot_from_tree(resolved[-1], origin)
-    found = doubts_of_inheritance(chain, resolved)
+    robot, found = robot_from_tree(resolved[-1], origin), list[str]()
+    if len(chain) > 1:
+        found += doubts_of_inheritance(*chain[-1], chain[-2][0], resolved[-2])
     return [*found, *doubts_of_values(robot, resolved[-1], origin)]
 
 

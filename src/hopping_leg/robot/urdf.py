@@ -1,10 +1,8 @@
 """URDF of a leg, for users of other tools.
 
-URDF knows neither a motor's reflected inertia nor its torque-speed limit: the former stands in the
-file as Drake reads it, ``drake:rotor_inertia`` times ``drake:gear_ratio`` squared; for the latter a
-joint's ``velocity`` is the speed at which its motor has no torque left. A joint's ``limit`` are its
-mechanical stops, its ``safety_controller`` has the soft limits, all at the joint's side of the
-belt. Reading it back, ``hopping_leg.robot.planar_leg`` leaves the transmissions out.
+URDF knows neither a motor's reflected inertia, which stands in a comment at each joint, nor its
+torque-speed limit: a joint's ``velocity`` is the speed at which its motor has no torque left. Its
+``limit`` are the mechanical stops. All is at the joint's side of the belt.
 """
 
 from xml.etree import ElementTree as Xml
@@ -25,7 +23,7 @@ def to_urdf(robot: Robot) -> str:
 
     The world's z is up, positive angles swing the foot to +x, zero is the straight leg downwards.
     """
-    root = Xml.Element("robot", {"name": robot.name, "xmlns:drake": "https://drake.mit.edu"})
+    root = Xml.Element("robot", name=robot.name)
     Xml.SubElement(root, "link", name="world")
     base = _link(root, "base", robot.base.mass, 0.0, _THIN)
     _shape(base, "collision", "sphere", 0.0, radius=robot.base.radius)
@@ -41,8 +39,6 @@ def to_urdf(robot: Robot) -> str:
     _hinge(root, "knee", "thigh", "shank", -robot.thigh.length, robot.knee)
     tip = _joint(root, "fixed", "foot_tip", "shank", "foot", -robot.shank.length)
     tip.append(Xml.Comment(" centre of the foot's sphere "))
-    _transmission(root, "hip", robot.hip)
-    _transmission(root, "knee", robot.knee)
     Xml.indent(root)
     text: str = Xml.tostring(root, encoding="unicode")
     return f'<?xml version="1.0"?>\n{text}\n'
@@ -97,23 +93,8 @@ def _hinge(root: Xml.Element, name: str, parent: str, child: str, z: float, join
     limit = {"lower": joint.stop_lower, "upper": joint.stop_upper}
     limit |= {"effort": joint.torque_limit, "velocity": joint.no_load_speed}
     Xml.SubElement(hinge, "limit", {key: _text(value) for key, value in limit.items()})
-    soft = {"soft_lower_limit": joint.lower, "soft_upper_limit": joint.upper, "k_velocity": 0.0}
-    Xml.SubElement(hinge, "safety_controller", {key: _text(value) for key, value in soft.items()})
+    hinge.append(Xml.Comment(f" armature: {_text(joint.armature)} kg m2 "))
     Xml.SubElement(hinge, "dynamics", damping=_text(joint.damping), friction=_text(joint.friction))
-
-
-def _transmission(root: Xml.Element, name: str, joint: Joint) -> None:
-    transmission = Xml.SubElement(root, "transmission", name=f"{name}_belt")
-    Xml.SubElement(transmission, "type").text = "transmission_interface/SimpleTransmission"
-    interface = "hardware_interface/EffortJointInterface"
-    element = Xml.SubElement(transmission, "joint", name=name)
-    Xml.SubElement(element, "hardwareInterface").text = interface
-    motor = Xml.SubElement(transmission, "actuator", name=f"{name}_motor")
-    Xml.SubElement(motor, "hardwareInterface").text = interface
-    Xml.SubElement(motor, "mechanicalReduction").text = _text(joint.belt_ratio)
-    ratio = joint.motor.gear_ratio * joint.belt_ratio
-    Xml.SubElement(motor, "drake:gear_ratio", value=_text(ratio))
-    Xml.SubElement(motor, "drake:rotor_inertia", value=_text(joint.armature / ratio**2))
 
 
 def _origin(element: Xml.Element, z: float) -> None:
