@@ -161,7 +161,8 @@ def _wiring(rng: np.random.Generator) -> Mishap:
 
 def _nothing(rng: np.random.Generator) -> Mishap:
     robot = str(rng.choice(["legv1", "legv2", "legv2-identified", "legv2-paper"]))
-    twin = int(rng.integers(1 << 30)) if rng.random() < 0.6 else None
+    drawn = robot != "legv1" and rng.random() < 0.8  # twins are those of leg V2
+    twin = int(rng.integers(1 << 30)) if drawn else None
     heights = tuple(float(height) for height in rng.uniform(0.22, 0.38, 8))
     return Mishap(health=Health(robot, twin, bool(rng.random() < 0.1), heights))
 

@@ -6,9 +6,11 @@ leave room for impacts, play and noise, and were set on simulated runs:
 - A joint that moved does not come to rest to the last bit within a tick. It does not stay so while
   the torque on it changes by more than its friction. And a sensor with noise never stays so. A dead
   encoder, which repeats a position with a velocity of zero, does all three.
-- From reply to reply the way of a position is the integral of its velocity, but for impacts.
+- From reply to reply the way of a position is the integral of its velocity, but for impacts and
+  for a joint that rattles faster than replies tell.
 - What a motor gives is what it was told, within what it can give at its speed, and always about as
-  late: where the torques of both joints come later than before, samples are old.
+  late: where the torques of both joints come later than before, samples are old. Torques that
+  alternate from tick to tick tell neither.
 """
 
 import math
@@ -32,15 +34,17 @@ _IMPACT = 2.0  # Change of speed between two replies beyond which velocities do 
 _WAY = 4e-3  # rad between two replies from which on position and velocity are compared
 _OTHER_WAY = (1e-3, 0.33)  # rad, and share of the longer way, by which they may differ
 _CONTRADICTIONS = 7  # in a row; impacts and play make four
+_RATTLE = 0.5  # rad/s by which the velocity of a joint that rattles goes up and down in turn
 _PUSH = 1e-2  # of squared torques over the limit squared that must be known
 _GIVEN = 0.1  # least torque reported over torque told
 
 _TICKS = 4  # by which a reported torque may come after the command
-_LATEST = 1  # ticks less one by which a healthy drive's torque comes after the command
+_LAGS = 2 * _TICKS - 1  # 1, 1.5, 2, ... ticks
+_LATEST = 3  # of these, the last that is a healthy drive's
 _LAG_FADING = 10  # ticks
 _LAG_CHANGE = 0.01  # of squared changes of torque over the limit squared that must be known
-_LAG_CLEAR = 3.0  # factor by which one lag must explain the torques better than any other
-_LAG_WORSE = 16.0  # factor by which the usual lag must explain them worse
+_LAG_CLEAR = 3.0  # factor by which one lag must explain the torques better than one a tick away
+_LAG_WORSE = 4.0  # factor by which the usual lag, and half a tick more, must explain them worse
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +84,9 @@ class JointEvidence:
         contradictions: Times in a row that a moving joint's position and velocity differed.
         newer, older: Sums of the squared torque that was told one tick, two ticks before, and of
             its product with the reported torque, over the limit squared, fading.
-        told: Torque that was told in the tick before, N m.
+        told: Torques that were told one and two ticks before, N m.
+        given: Torque of the reply, over the limit.
+        swing: Change of velocity with the reply, rad/s.
     """
 
     replies: int = 0
@@ -91,19 +97,23 @@ class JointEvidence:
     contradictions: int = 0
     newer: Pair = (0.0, 0.0)
     older: Pair = (0.0, 0.0)
-    told: float = 0.0
+    told: Pair = (0.0, 0.0)
+    given: float = 0.0
+    swing: float = 0.0
 
     def after(
         self, motor: MotorLine, last: Reply | None, reply: Reply, told: float
     ) -> "JointEvidence":
         """Return the evidence with a reply; ``told`` is the torque in force since the last, N m."""
         if last is None:
-            return JointEvidence(told=told)
+            return JointEvidence(told=(told, told))
         elapsed, way = reply.taken - last.taken, reply.position - last.position
         same_speed = abs(reply.velocity) <= _STILL_SPEED or reply.velocity == last.velocity
         repeats = abs(way) <= _STILL_RADIANS and same_speed
         if reply.mode != DriveMode.POSITION:  # a leg may be held, or stand
-            return JointEvidence(self.replies + 1, stillest=self.stillest + repeats, told=told)
+            return JointEvidence(
+                self.replies + 1, stillest=self.stillest + repeats, told=(told, told)
+            )
         still, stillest, before, torques = 0, max(self.stillest, self.still), 0.0, (told, told)
         if repeats:
             still, stillest, before = self.still + 1, self.stillest, abs(last.velocity)
@@ -111,22 +121,28 @@ class JointEvidence:
                 before = self.speed_before
                 torques = min(self.torques[0], told), max(self.torques[1], told)
         contradictions, newer, older = self.contradictions, (0.0, 0.0), (0.0, 0.0)
+        given, swing = reply.torque / motor.limit, reply.velocity - last.velocity
         if 0 < elapsed < _FADING:
-            fading = math.exp(-elapsed / _FADING)
-            if abs(reply.velocity - last.velocity) <= _IMPACT:
+            if abs(swing) <= _IMPACT:
                 integral = elapsed * (last.velocity + reply.velocity) / 2
                 longer, (least, share) = max(abs(way), abs(integral)), _OTHER_WAY
                 if longer > _WAY:
                     differs = abs(way - integral) > least + share * longer
                     contradictions = contradictions + 1 if differs else 0
-            if reply.velocity * last.velocity <= 0:  # it may rattle in its play
+            rattles = swing * self.swing < 0 and min(abs(swing), abs(self.swing)) > _RATTLE
+            if rattles or reply.velocity * last.velocity <= 0:
                 contradictions = 0
-            given = reply.torque / motor.limit
-            newer = _summed(self.newer, fading, motor.share(told, reply.velocity), given)
-            older = _summed(self.older, fading, motor.share(self.told, reply.velocity), given)
+            weight = 0.0 if rattles else 1.0
+            fading, mean = math.exp(-elapsed / _FADING), (given + self.given) / 2
+            first, second, third = (
+                motor.share(torque, reply.velocity) for torque in (told, *self.told)
+            )
+            newer = _summed(self.newer, fading, weight * (first + second) / 2, mean)
+            older = _summed(self.older, fading, weight * (second + third) / 2, mean)
         return JointEvidence(
-            self.replies + 1, still, stillest, before, torques, contradictions, newer, older, told
-        )
+            self.replies + 1, still, stillest, before, torques, contradictions, newer, older,
+            (told, self.told[0]), given, swing,
+        )  # fmt: skip
 
     def dead(self, motor: MotorLine) -> str:
         """Return why the encoder must be dead, "" if it need not."""
@@ -167,16 +183,16 @@ class LagEvidence:
 
     Attributes:
         told: Torques that were told in the last ticks, the newest first, N m.
-        errors: Sums of the squared difference of reported torques from those told 1, 2, 3 and 4
+        errors: Sums of the squared difference of reported torques from those told 1, 1.5, 2 ... 4
             ticks before, over the limits squared, fading.
         changes: Sum of squared changes of the torques told, likewise.
-        usual: Least lag that ever explained the torques clearly best, ticks less one.
+        usual: Least of these lags, 0 the first, that ever explained the torques clearly best.
     """
 
     told: tuple[Pair, ...] = ()
-    errors: tuple[float, ...] = (0.0,) * _TICKS
+    errors: tuple[float, ...] = (0.0,) * _LAGS
     changes: float = 0.0
-    usual: int = _TICKS
+    usual: int = _LAGS
 
     def after(
         self, motors: tuple[MotorLine, MotorLine], replies: tuple[Reply, Reply], told: Pair
@@ -190,21 +206,23 @@ class LagEvidence:
         for joint, (motor, reply) in enumerate(zip(motors, replies, strict=True)):
             shares = [motor.share(pair[joint], reply.velocity) for pair in past]
             given = reply.torque / motor.limit
-            for lag, share in enumerate(shares):
-                errors[lag] += (given - share) * (given - share)  # an overflow is infinite
+            for lag in range(_LAGS):
+                off = given - (shares[lag // 2] + shares[(lag + 1) // 2]) / 2
+                errors[lag] += off * off  # an overflow is infinite
             changes += (shares[0] - shares[1]) * (shares[0] - shares[1])
-        best, second = sorted(errors)[:2]
-        clear = changes > _LAG_CHANGE and second > _LAG_CLEAR * best + 1e-6
-        usual = min(self.usual, errors.index(best)) if clear else self.usual
+        best = errors.index(min(errors))
+        away = min(errors[: max(best - 1, 0)] + errors[best + 2 :])
+        clear = changes > _LAG_CHANGE and away > _LAG_CLEAR * errors[best] + 1e-6
+        usual = min(self.usual, best) if clear else self.usual
         return LagEvidence(past, tuple(errors), changes, usual)
 
     def stale(self) -> str:
         """Return by how much the samples are older than before, "" if they are not."""
-        if self.usual == _TICKS or self.changes < _LAG_CHANGE:
+        if self.usual == _LAGS or self.changes < _LAG_CHANGE:
             return ""
         if self.usual > _LATEST:
-            return f"torques come {self.usual + 1} ticks after their commands"
+            return f"torques come {1 + self.usual / 2:g} ticks after their commands"
         best = min(self.errors)
         later = self.errors.index(best) - self.usual
-        worse = self.errors[self.usual] > _LAG_WORSE * best + _LAG_CHANGE
-        return f"torques come {later} ticks later" if later > 0 and worse else ""
+        worse = min(self.errors[self.usual : self.usual + 2]) > _LAG_WORSE * best + _LAG_CHANGE / 4
+        return f"torques come {later / 2:g} ticks later" if later > 1 and worse else ""
