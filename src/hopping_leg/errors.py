@@ -1,6 +1,6 @@
 """Errors a user can act on: one sentence that says what is wrong, what was valid, what to do."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from difflib import get_close_matches
 
 _LONGEST = 1000
@@ -48,29 +48,14 @@ class HardwareError(HoppingLegError):
     """Drives, wire or adapter are not as they must be; nothing has moved."""
 
 
-def unknown_name(
-    kind: str, name: str, valid: Iterable[str], meant: Mapping[str, str] | None = None
-) -> str:
-    """Return the sentence for a name that does not exist, with the valid ones.
-
-    ``meant`` holds words that others use for a valid name, separated by spaces.
-    """
+def unknown_name(kind: str, name: str, valid: Iterable[str]) -> str:
+    """Return the sentence for a name that does not exist, with the valid ones."""
     names = sorted(valid)
-    near = " or ".join(f"'{one}'" for one in nearest_names(name, names, meant))
-    hint = f" Did you mean {near}?" if near else ""
+    hint = "".join(f" Did you mean '{near}'?" for near in nearest_names(name, names))
     return f"There is no {kind} '{name}'.{hint} Available: {', '.join(names)}."
 
 
-def nearest_names(
-    name: str, valid: Iterable[str], meant: Mapping[str, str] | None = None
-) -> list[str]:
-    """Return the valid names that a name means, or that of the nearest letters, or none."""
-    words: dict[str, list[str]] = {one.lstrip("-").lower(): [one] for one in valid}
-    for (one,) in list(words.values()):
-        for word in (meant or {}).get(one, "").split():
-            words.setdefault(word, []).append(one)
-    asked = name.lstrip("-").lower()
-    if asked in words:
-        return words[asked]
-    close = get_close_matches(asked, words, n=1)
-    return words[close[0]] if close else []
+def nearest_names(name: str, valid: Iterable[str]) -> list[str]:
+    """Return the valid name of the nearest letters, or none."""
+    names = {one.lower(): one for one in valid}
+    return [names[one] for one in get_close_matches(name.lower(), names, n=1)]

@@ -1,18 +1,13 @@
-"""One look for all figures: colour-blind safe, units on every axis, the same bytes every time.
-
-For print, figures get the width of a paper's column or page and text that stays readable there.
-"""
+"""One look for all figures: colour-blind safe, units on every axis, the same bytes every time."""
 
 import functools
 import io
-import math
 from collections.abc import Callable
 from typing import Literal, ParamSpec
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.text import Text
 from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from hopping_leg.colours import COLOURS
@@ -91,56 +86,13 @@ def to_png(figure: Figure, dpi: float = 130) -> bytes:
     return buffer.getvalue()
 
 
-Format = Literal["svg", "pdf", "png"]
-Width = Literal["screen", "column", "page"]
-
-INCHES = {"column": 3.5, "page": 7.16}
-"""Width of a column and of the page in IEEE's two-column format."""
-
-_SMALLER = {"column": 7 / 9, "page": 8 / 9}
-"""Text and lines relative to the screen's, whose text is 9 pt."""
-
-_PRINT_DPI = 300
+def to_pdf(figure: Figure) -> bytes:
+    """Return a figure as PDF without a date, its fonts embedded."""
+    buffer = io.BytesIO()
+    with mpl.rc_context({"pdf.fonttype": 42}):
+        figure.savefig(buffer, format="pdf", metadata={"CreationDate": None})
+    return buffer.getvalue()
 
 
-def encode(figure: Figure, kind: Format, width: Width = "screen") -> bytes:
-    """Return a figure as a file's content, the same bytes every time, resized for print.
-
-    Fonts are embedded in a PDF.
-    """
-    if width != "screen":
-        fit_width(figure, width)
-    if kind == "svg":
-        return to_svg(figure)
-    if kind == "pdf":
-        buffer = io.BytesIO()
-        with mpl.rc_context({"pdf.fonttype": 42}):
-            figure.savefig(buffer, format="pdf", dpi=_PRINT_DPI, metadata={"CreationDate": None})
-        return buffer.getvalue()
-    return to_png(figure, dpi=130 if width == "screen" else _PRINT_DPI)
-
-
-def fit_width(figure: Figure, width: Literal["column", "page"]) -> None:
-    """Resize a figure in place; narrower ones become relatively higher, so panels keep room."""
-    share = INCHES[width] / figure.get_figwidth()
-    figure.set_size_inches(INCHES[width], figure.get_figheight() * math.sqrt(share))
-    if width == "column":
-        _fold_legends(figure)
-    shrink = _SMALLER[width]
-    for text in figure.findobj(Text):
-        text.set_fontsize(shrink * float(text.get_fontsize()))
-    for axes in figure.axes:
-        for line in axes.lines:
-            line.set_linewidth(shrink * line.get_linewidth())
-
-
-def _fold_legends(figure: Figure) -> None:
-    """Give legends beside the panels two columns, as four are wider than a column of text."""
-    for legend in list(figure.legends):
-        size = legend.get_texts()[0].get_fontsize()
-        labels = [text.get_text() for text in legend.get_texts()]
-        handles = [handle for handle in legend.legend_handles if handle is not None]
-        legend.remove()
-        figure.legend(
-            handles, labels, loc="outside upper right", ncols=2, fontsize=size, frameon=False
-        )
+ENCODERS = {"svg": to_svg, "pdf": to_pdf, "png": to_png}
+"""What makes a file's content of a figure, by the file's suffix."""

@@ -134,7 +134,7 @@ def _judge(entries: "list[Entry]", setup: "RolloutConfig", args: Evaluate) -> "E
     from hopping_leg.evaluate import evaluate, trials
 
     floors = ("soft", "stiff") if args.floor == "both" else (args.floor,)
-    with progress.ShareProgress(parts=len(entries) * len(floors)) as bar:
+    with progress.Progress(parts=len(entries) * len(floors)) as bar:
         judged = [
             evaluate(
                 entries,
@@ -163,7 +163,7 @@ def _judge_robustness(args: Evaluate, command: str) -> None:
     entries, setup = args.load()
     out, heights, seeds = args.out or Path("runs/robustness"), args.commands, args.seeds
     suite = make_suite(setup, axes=args.axes, commands=heights, repeats=seeds, seed=args.seed)
-    with progress.ShareProgress(parts=len(entries)) as bar:
+    with progress.Progress(parts=len(entries)) as bar:
         found = run_suite(entries, suite, ResultCache(out), bar.show)
     result = {"command": command, **found}
     file, figure = args.json or out / "robustness.json", out / "robustness.svg"

@@ -21,7 +21,7 @@ from rich.table import Column
 
 from hopping_leg import errors, io
 from hopping_leg.cli.options import JsonFile, command_line, save_json, say, say_next, show_table
-from hopping_leg.progress import LiveProgress, said_if_slow
+from hopping_leg.progress import Progress, said_if_slow
 from hopping_leg.robot import JOINTS, load_robot
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class Identify:
     """Simulate on the Ray cluster at this address; `local` starts one on this machine."""
 
 
-class FitProgress(LiveProgress):
+class FitProgress(Progress):
     """Stage, share done, time left and cost of a fit, as a context manager."""
 
     def __init__(self) -> None:
@@ -76,7 +76,7 @@ class FitProgress(LiveProgress):
 
     def update(self, stage: str, share: float, cost: float) -> None:
         """Show what is being done, the share done of all, 0 to 1, and the lowest cost."""
-        self._show("fit", stage, share, f"cost {cost:.5g}")
+        self.show(stage, share, f"cost {cost:.5g}", key="fit")
 
 
 def run(args: Identify) -> None:

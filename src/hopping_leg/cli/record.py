@@ -41,7 +41,7 @@ from hopping_leg.identify.excitation import (
     load_excitation,
     make_excitation,
 )
-from hopping_leg.progress import ShareProgress
+from hopping_leg.progress import Progress
 from hopping_leg.robot import TIMESTEP, Robot, load_robot, parent_robot
 
 
@@ -215,7 +215,7 @@ def _play(args: Play) -> None:
         _record_motors(args, args.transport, robot, loaded, believed, gains)
         return
     files = []
-    with ShareProgress(parts=len(loaded)) as bar:
+    with Progress(parts=len(loaded)) as bar:
         for number, (stem, excitation) in enumerate(loaded):
             show = partial(bar.show_tick, stem, len(excitation))
             recording = play_excitation.play(

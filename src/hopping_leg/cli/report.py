@@ -2,7 +2,7 @@
 
 Examples:
   hop report runs/first/traces/*.parquet --out runs/first/figures
-  hop report runs/first/traces/*-fixed-*.parquet --format pdf --width column
+  hop report runs/first/traces/*-fixed-*.parquet --format pdf
   hop report runs/first/traces/*-fixed-*.parquet --animation gif
 """
 
@@ -33,8 +33,6 @@ class Report:
     """Folder for the figures."""
     format: Literal["svg", "pdf", "png"] = "svg"
     """Kind of file."""
-    width: Literal["screen", "column", "page"] = "screen"
-    """Width of the figures: a screen, or a column (3.5 in) or page (7.16 in) of a paper."""
     animation: Literal["gif", "webp"] | None = None
     """Also render a hop at each command, side by side at half speed, one file per controller; needs
     OpenGL and traces of a shipped robot."""
@@ -61,7 +59,7 @@ def _draw(args: Report) -> None:
         aggregation.tabulate(runs, controllers, seed=0), runs
     ):
         path = args.out / f"{picture.name}.{args.format}"
-        io.write_atomically(path, figure_style.encode(picture.figure, args.format, args.width))
+        io.write_atomically(path, figure_style.ENCODERS[args.format](picture.figure))
         say(f"{picture.title}: {path}")
     if args.animation is not None:
         for name, colour in controller_colours(controllers).items():

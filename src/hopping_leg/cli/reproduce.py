@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 from hopping_leg import io
 from hopping_leg.cli import options
 from hopping_leg.errors import UsageError
-from hopping_leg.progress import ShareProgress
+from hopping_leg.progress import Progress
 from hopping_leg.robot import Robot, load_robot, parent_robot
 
 if TYPE_CHECKING:
@@ -217,7 +217,7 @@ def _hop(
         for name, (what, robot) in told.items()
     ]
     noise = NoiseAndDelay() if twin.reality.neutral else NO_NOISE  # a twin brings its own
-    with ShareProgress(parts=len(entries)) as bar:
+    with Progress(parts=len(entries)) as bar:
         return runner.evaluate(
             entries,
             RolloutConfig(twin, noise),

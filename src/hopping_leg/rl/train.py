@@ -13,7 +13,7 @@ import torch
 from hopping_leg import errors, io, locks
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.envs import TaskLeg
-from hopping_leg.progress import LiveProgress
+from hopping_leg.progress import Progress
 from hopping_leg.rl import (
     loggers,
     onnx_export,
@@ -31,7 +31,7 @@ from hopping_leg.rl.selection import Selection
 from hopping_leg.robot.parameters import Robot
 
 
-class TrainingProgress(LiveProgress):
+class TrainingProgress(Progress):
     """Live numbers of a training, as a context manager."""
 
     def __init__(self, title: str, *, quiet: bool = False) -> None:
@@ -50,15 +50,15 @@ class TrainingProgress(LiveProgress):
         if more > 0:
             note += f" · {more / max(seconds, 1e-9):.0f} steps/s"
         note += best
-        self._show("training", self._title, share, note)
+        self.show(self._title, share, note, key="training")
 
     def prepare(self, what: str, share: float) -> None:
         """Show the share of what is done before the training, 0 to 1."""
-        self._show(what, f"{self._title}, {what}", share)
+        self.show(self._title, share, about=f", {what}")
 
     def finish(self, what: str) -> None:
         """Show what is done after the training itself."""
-        self._show("training", f"{self._title}, {what}", 1.0)
+        self.show(self._title, 1.0, about=f", {what}", key="training")
 
 
 _RANGE_LEGS, _RANGE_STRIDE = 24, 5
