@@ -21,7 +21,7 @@ CEILINGS = {
     "src/hopping_leg/sim/**/*.py": (13, 2490),
     "src/hopping_leg/viewer/**/*.py": (8, 1380),
     "src/**/*.py": (196, 30740),
-    "tests/**/*.py": (145, 16540),
+    "tests/**/*.py": (145, 16470),
     "studies/**/*.py": (82, 8620),
     "docs/**/*.md": (22, 2530),
     "docs/live/*.js": (13, 1490),
