@@ -1,5 +1,9 @@
 """Test set-up shared by all rooms."""
 
+import functools
+import http.server
+import threading
+
 import pytest
 from hypothesis import settings
 
@@ -55,13 +59,16 @@ def page(browser):
 
 
 @pytest.fixture
-def foreign(browser):
-    """A page of another site, also on this computer, so that the browser alone forbids nothing."""
+def foreign(browser, tmp_path):
+    """A page of another site, served by this computer so that the browser alone forbids nothing."""
     from studies.speed.browser import new_page
 
-    site = "http://127.0.0.1:9999/"
-    page = new_page(browser)
-    page.route(f"{site}**", lambda route: route.fulfill(body="<p>", content_type="text/html"))
-    page.goto(site)
-    yield page
-    page.close()
+    (tmp_path / "index.html").write_text("<p>")
+    serve = functools.partial(http.server.SimpleHTTPRequestHandler, directory=tmp_path)
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), serve) as site:
+        threading.Thread(target=site.serve_forever, daemon=True).start()
+        page = new_page(browser)
+        page.goto(f"http://127.0.0.1:{site.server_port}")
+        yield page
+        page.close()
+        site.shutdown()

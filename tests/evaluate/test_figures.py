@@ -10,7 +10,7 @@ from hopping_leg.colours import COLOURS, controller_colours
 from hopping_leg.evaluate import figures as drawing
 from hopping_leg.evaluate import metrics
 from hopping_leg.evaluate.report import draw_report_figures
-from hopping_leg.evaluate.trials import load_run
+from hopping_leg.evaluate.trials import load_run, save_traces
 from hopping_leg.evaluate.video import CLIP_SECONDS, FRAME_RATE, fixed_traces, render_hops, sample
 from hopping_leg.figure_style import ENCODERS, to_svg
 from hopping_leg.hop_detection import find_hops
@@ -65,21 +65,15 @@ def test_controllers_beside_each_other_share_their_axes_and_keep_their_colours(f
 
 
 def test_the_gallery_from_stored_traces_is_the_reports(judged, tmp_path):
-    for run in judged.runs:
-        run.trace.save(tmp_path / run.file_name)
-    again = [load_run(tmp_path / run.file_name) for run in judged.runs]
+    again = [load_run(path) for path in save_traces(judged.runs, tmp_path)]
     assert [(r.controller, r.trial.kind, r.repeat) for r in again] == [
         (r.controller, r.trial.kind, r.repeat) for r in judged.runs
     ]
+    assert again[0].trace.table.equals(judged.runs[0].trace.table)
+    assert not again[1].trace.table.equals(again[0].trace.table), "repeats differ in their noise"
     before, after = (draw_report_figures(judged.evaluation, runs) for runs in (judged.runs, again))
-    assert [p.name for p in before] == [
-        "apexes",
-        "distributions",
-        "staircase",
-        "sequence",
-        "phase-space",
-    ]
-    assert [p.name for p in after] == [p.name for p in before]
+    names = ["apexes", "distributions", "staircase", "sequence", "phase-space"]
+    assert [p.name for p in before] == [p.name for p in after] == names
     assert to_svg(after[0].figure) == to_svg(before[0].figure)
 
 

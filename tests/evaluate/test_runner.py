@@ -18,11 +18,9 @@ from hopping_leg.evaluate.trials import (
     COMMANDS,
     floor_robot,
     paper_trials,
-    save_traces,
 )
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
-from hopping_leg.trace import Trace
 from tests.evaluate.conftest import Spring
 
 
@@ -54,15 +52,6 @@ def test_the_json_has_the_promised_names_and_no_nan(judged):
     row = dataclasses.replace(judged.evaluation.summary[0], median_error_m=float("nan"))
     empty = dataclasses.replace(judged.evaluation, summary=[row])
     assert empty.to_json()["summary"][0]["median_error_m"] is None
-
-
-def test_traces_are_stored_one_per_run(judged, tmp_path):
-    paths = save_traces(judged.runs, tmp_path)
-    assert len(set(paths)) == len(judged.runs) == 8
-    trace = Trace.load(paths[0])
-    assert trace.header["trial"] == "fixed-0.250"
-    assert trace.table.equals(judged.runs[0].trace.table)
-    assert not Trace.load(paths[1]).table.equals(trace.table), "repeats differ in their noise"
 
 
 def test_the_stiff_floor_changes_the_contact_only(robot):

@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("viser", reason="the extra 'view' is not installed")
 
+import viser
 import websockets
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,7 +18,7 @@ from websockets.http11 import Request
 
 from hopping_leg.errors import UsageError
 from hopping_leg.viewer.live_leg import LiveSimulation
-from hopping_leg.viewer.panels import GuiQueue, LivePanel, chosen, within
+from hopping_leg.viewer.panels import Inputs, LivePanel, chosen, within
 from hopping_leg.viewer.viewer import Viewer, answer
 
 OWN = ("127.0.0.1:8080", "localhost:9000", "[::1]:1", "localhost")
@@ -63,6 +64,33 @@ def test_the_served_page_and_its_websocket_are_guarded():
                 asyncio.run(knock(origin))
 
 
+_KNOCK = """address => new Promise(done => {
+  const socket = new WebSocket(address, ["viser-v0"]);
+  socket.onopen = () => done("open");
+  socket.onerror = socket.onclose = () => done("refused");
+})"""
+_READ = "address => fetch(address).then(page => page.text(), () => 'refused')"
+_FRAME = """address => new Promise(done => {
+  const frame = document.createElement("iframe");
+  [frame.src, frame.onload] = [address, done];
+  document.body.append(frame);
+})"""
+
+
+@pytest.mark.slow
+def test_a_page_of_another_site_can_neither_read_nor_show_nor_steer_it(foreign):
+    with Served() as (host, port):
+        page, socket = f"http://{host}:{port}", f"ws://{host}:{port}"
+        assert foreign.evaluate(_KNOCK, socket) == "refused"
+        assert foreign.evaluate(_READ, page) == "refused"
+        foreign.evaluate(f"address => void ({_FRAME})(address)", page)
+        foreign.wait_for_timeout(1000)
+        assert not any("viser" in frame.content() for frame in foreign.frames[1:])
+        foreign.goto(page, wait_until="commit")  # its own page may
+        assert foreign.evaluate(_KNOCK, socket) == "open"
+        assert "<html" in foreign.evaluate(_READ, page)
+
+
 class Served:
     """A live simulation's page."""
 
@@ -98,17 +126,16 @@ def test_a_value_that_was_not_offered_is_refused(value):
 def test_the_page_cannot_name_a_file_or_a_class(tmp_path):
     plug_in, mark = tmp_path / "mine.py", tmp_path / "loaded"
     plug_in.write_text(f"open({str(mark)!r}, 'w')\n")
-    viser = pytest.importorskip("viser")
     server = viser.ViserServer(port=0, verbose=False)
-    live, queue = LiveSimulation(("energy-shaping",), "legv2-paper", 0.3), GuiQueue()
-    panel = LivePanel(server, queue, live)
+    live, inputs = LiveSimulation(("energy-shaping",), "legv2-paper", 0.3), Inputs(server)
+    panel = LivePanel(inputs, live)
     for handle, name in itertools.product(
         (panel._first, panel._second, panel._robot), (f"{plug_in}:Mine", "/etc/passwd", "x.toml")
     ):
         before = (live.names, live.robot)
         shown, handle._impl.value = handle.value, name
-        queue.put(panel._begin)
-        (complaint,) = queue.run()
+        inputs.put(panel._begin)
+        (complaint,) = inputs.run()
         assert "does not offer" in complaint
         assert (live.names, live.robot) == before
         handle._impl.value = shown

@@ -27,7 +27,7 @@ from hopping_leg.cli.options import say
 from hopping_leg.errors import UsageError
 
 if TYPE_CHECKING:
-    from hopping_leg.viewer.data_source import DataSource
+    from hopping_leg.viewer.tracks import DataSource
 
 
 @dataclass(frozen=True)
@@ -76,8 +76,8 @@ def run(args: View) -> None:
 def _source(args: View) -> "DataSource":
     """Return what is to be shown; whatever can be wrong with it is found here."""
     from hopping_leg.controllers.registry import robot_of
-    from hopping_leg.viewer.data_source import RecorderSource, ReplaySource
     from hopping_leg.viewer.live_leg import LiveSimulation
+    from hopping_leg.viewer.tracks import RecorderSource, ReplaySource
 
     if args.trace and args.box is not None:
         raise UsageError("--trace and --box exclude each other; give one of them.")

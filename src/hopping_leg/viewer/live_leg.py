@@ -6,18 +6,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hopping_leg.arrays import Array
 from hopping_leg.controllers import command_schedule, protocol, registry
 from hopping_leg.controllers.rollout import RolloutConfig
-from hopping_leg.errors import PhysicsError, UsageError
+from hopping_leg.errors import UsageError
 from hopping_leg.robot import Robot, SoftLimits, load_robot
-from hopping_leg.sim import CONTROL_RATE, NO_NOISE, LegSimulator, NoiseAndDelay, Plant, stepper
+from hopping_leg.sim import (
+    CONTROL_RATE,
+    NO_NOISE,
+    LegSimulator,
+    Measurement,
+    NoiseAndDelay,
+    Plant,
+    stepper,
+)
 from hopping_leg.sim.compiled import FOLDER, say_compiling, was_compiled
 from hopping_leg.sim.mujoco_simulator import MujocoSimulator
-from hopping_leg.viewer.tracks import FIELDS, Track
-
-MOST = 2
-"""Legs side by side."""
+from hopping_leg.viewer.tracks import FIELDS, MOST, Track
 
 KEPT_SECONDS = 10.0
 """Of every leg's past."""
@@ -77,14 +81,21 @@ def start_compiling() -> "subprocess.Popen[bytes] | None":
     return subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL)
 
 
+_ALL = slice(None)
+_IMPOSSIBLE = 1e4
+"""Joint speed that no leg reaches, rad/s."""
+
+
 class LiveSimulation:
     """The simulation behind the page; knows nothing of it.
+
+    Controllers believe the robot to be as its file has it, whatever the settings.
 
     Args:
         controllers: One or two names or files.
         robot: Name or file.
         height: Commanded first, m; brought into what the controllers can be asked for.
-        seed: Of noise and random delay, the same for both legs.
+        seed: Of noise and random delay.
         at_once: Let MuJoCo simulate while the stepper is being compiled, if it never was here.
 
     Raises:
@@ -111,30 +122,35 @@ class LiveSimulation:
         self.height = height
         self.robot = load_robot(robot)
         self.settings = default_settings(self.robot)
-        self.names: tuple[str, ...] = ()
         self._compiling = start_compiling() if at_once else None
-        self._in_mujoco = False
         self.begin(controllers, robot)
 
     def advance(self, seconds: float) -> None:
         """Let simulated time pass, in whole ticks."""
         if self._compiling is not None and self._compiling.poll() is not None:
-            self._compiling, self._in_mujoco = None, False
+            self._compiling = None
             self._go_on()
         for _ in range(round(seconds * CONTROL_RATE)):
             self.tick()
 
     def tick(self) -> None:
-        """Let one control period pass; a leg whose physics fails stands up again."""
-        force = self._force if self._push_ticks else 0.0
+        """Let one control period pass; a leg that became unstable stands up again."""
+        legs, rows = self._legs, np.empty((len(FIELDS), len(self.tracks)))
+        legs.push(np.full(legs.count, self._force if self._push_ticks else 0.0))
         self._push_ticks = max(self._push_ticks - 1, 0)
-        for leg, track in zip(self._legs, self.tracks, strict=True):
-            try:
-                row = leg.tick(self.height, force)
-                track.extend(np.array([self.now]), row[:, None])
-            except PhysicsError as error:
-                self.notices.append(f"{error} The leg stands up again.")
-                leg.stand(self.height)
+        rows[:3] = np.full(legs.count, self.height), legs.height, legs.height_rate
+        rows[3:5] = legs.q.T
+        rows[7] = legs.foot_clearance()
+        seen = self._plant.sense(rows[0])
+        torques = [c.act(_of_leg(seen, leg)) for leg, c in enumerate(self._controllers)]
+        rows[5:7] = self._plant.drive(np.concatenate(torques)).T
+        rows[8] = [c.internals().get("phase", [np.nan])[0] for c in self._controllers]
+        for leg, track in enumerate(self.tracks):
+            if np.abs(legs.qd[leg]).max() < _IMPOSSIBLE:
+                track.extend(np.array([self.now]), rows[:, leg : leg + 1])
+            else:
+                self.notices.append(f"{track.name} became unstable. The leg stands up again.")
+                self.stand(slice(leg, leg + 1))
         self.now += 1 / CONTROL_RATE
 
     def set_height(self, height: float) -> float:
@@ -145,8 +161,7 @@ class LiveSimulation:
 
     def push(self, force: float) -> None:
         """Push the bases up, or down with a negative force, N, for ``PUSH_SECONDS``."""
-        self._force = force
-        self._push_ticks = round(PUSH_SECONDS * CONTROL_RATE)
+        self._force, self._push_ticks = force, round(PUSH_SECONDS * CONTROL_RATE)
 
     def set_settings(self, settings: LiveSettings) -> None:
         """Change the settings while the legs hop; their controllers are not told.
@@ -154,15 +169,11 @@ class LiveSimulation:
         Raises:
             UsageError: The physics that knows of such settings is still being compiled.
         """
-        if self._in_mujoco and not settings.apply(self.robot).reality.neutral:
+        in_mujoco = isinstance(self._legs, MujocoSimulator)
+        if in_mujoco and not settings.apply(self.robot).reality.neutral:
             raise UsageError("Delays can be set once the leg's physics is compiled, in seconds.")
         self.settings = settings
         self._go_on()
-
-    def stand(self) -> None:
-        """Let all legs begin anew, standing."""
-        for leg in self._legs:
-            leg.stand(self.height)
 
     def begin(self, names: tuple[str, ...], robot_name: str) -> None:
         """Begin anew with controllers on a robot; another robot has its own settings.
@@ -174,25 +185,58 @@ class LiveSimulation:
         robot.require_leg()
         if not 1 <= len(names) <= MOST:
             raise UsageError(f"{len(names)} controllers were given; give one, or two side by side.")
-        loaded = [registry.load_controller(name, robot) for name in names]
-        self.valid = _shared_range(loaded, robot)
+        controllers = [registry.load_controller(name, robot) for name in names]
+        self.valid = _shared_range(controllers, robot)
         if robot != self.robot:
             self.settings = default_settings(robot)
         self.robot, self.robot_name, self.names = robot, robot_name, names
         self.set_height(self.height)
-        changed = self.settings.apply(robot)
-        self._in_mujoco = self._compiling is not None and changed.reality.neutral
-        self._legs = [LiveLeg(c, changed, self._seed, in_mujoco=self._in_mujoco) for c in loaded]
-        self._go_on()
+        self._controllers, depth = controllers, round(KEPT_SECONDS * CONTROL_RATE)
+        self.tracks = [Track(c.name, robot, depth=depth) for c in controllers]
+        self._rng = np.random.default_rng(self._seed)
+        self._legs = self._simulator()
+        self._meet()
         self.stand()
-        depth = round(KEPT_SECONDS * CONTROL_RATE)
-        self.tracks = [Track(c.name, robot, depth=depth) for c in loaded]
+
+    def stand(self, which: slice = _ALL) -> None:
+        """Let legs begin anew, standing."""
+        self._legs.stand(which, RolloutConfig(self.robot).start_posture)
+        for controller in self._controllers[which]:
+            controller.reset(1)
+        self._restart(which)
 
     def _go_on(self) -> None:
+        """Go on with the present settings in the present state."""
+        before = self._legs
+        if isinstance(before, LegSimulator):
+            before.set_robots([self.settings.apply(self.robot)] * before.count)
+        else:
+            self._legs = self._simulator()
+            self._legs.state[:] = before.state
+            self._legs.forget(_ALL)
+        self._meet()
+
+    def _simulator(self) -> LegSimulator | MujocoSimulator:
         changed = self.settings.apply(self.robot)
-        noise_and_delay = NoiseAndDelay() if self.settings.noise else NO_NOISE
-        for leg in self._legs:
-            leg.go_on(changed, noise_and_delay, self.height, in_mujoco=self._in_mujoco)
+        early = self._compiling is not None and changed.reality.neutral
+        kind = MujocoSimulator if early else LegSimulator
+        return kind(changed, len(self._controllers), rate=CONTROL_RATE, threads=1)
+
+    def _meet(self) -> None:
+        """Let the controllers meet the legs through sensors, noise and delay."""
+        disturbance = NoiseAndDelay() if self.settings.noise else NO_NOISE
+        self._plant = Plant(self._legs, disturbance, SoftLimits(), self._rng)
+        self._restart(_ALL)
+
+    def _restart(self, legs: slice) -> None:
+        q, qd = self._legs.q[legs], self._legs.qd[legs]
+        self._plant.channel.restart(legs, q, qd, np.full(len(q), self.height))
+
+
+def _of_leg(seen: Measurement, leg: int) -> Measurement:
+    """Return what the controller of one leg sees."""
+    part = slice(leg, leg + 1)
+    return Measurement(seen.q[part], seen.qd[part], seen.command[part], seen.age[part])
 
 
 def _shared_range(controllers: list[protocol.Controller], robot: Robot) -> command_schedule.Range:
@@ -202,74 +246,3 @@ def _shared_range(controllers: list[protocol.Controller], robot: Robot) -> comma
         names = " and ".join(controller.name for controller in controllers)
         raise UsageError(f"{names} share no height that both can be asked for; show them in turn.")
     return low, high
-
-
-_ALL = slice(None)
-_IMPOSSIBLE = 1e4
-"""Joint speed that no leg reaches, rad/s."""
-
-
-class LiveLeg:
-    """A leg that hops under a controller that believes it to be as its file has it."""
-
-    def __init__(
-        self, controller: protocol.Controller, robot: Robot, seed: int, *, in_mujoco: bool
-    ) -> None:
-        self.controller = controller
-        self._rng = np.random.default_rng(seed)
-        self._force = 0.0
-        self._legs = _simulator(robot, in_mujoco=in_mujoco)
-
-    def stand(self, height: float) -> None:
-        """Begin anew, standing; ``height`` is what is commanded, m."""
-        self._legs.stand(_ALL, RolloutConfig(self._legs.robot).start_posture)
-        self._legs.push(np.zeros(1))
-        self._force = 0.0
-        self.controller.reset(1)
-        self._restart(height)
-
-    def go_on(
-        self, robot: Robot, noise_and_delay: NoiseAndDelay, height: float, *, in_mujoco: bool
-    ) -> None:
-        """Go on as a changed robot in the present state; the controller is not told."""
-        legs = self._legs
-        if isinstance(legs, LegSimulator):
-            legs.set_robots([robot])
-        else:
-            self._legs = _simulator(robot, in_mujoco=in_mujoco)
-            self._legs.state[:] = legs.state
-            self._legs.forget(_ALL)
-            self._legs.push(np.array([self._force]))
-        self._plant = Plant(self._legs, noise_and_delay, SoftLimits(), self._rng)
-        self._restart(height)
-
-    def tick(self, height: float, force: float) -> Array:
-        """Let one control period pass; return its row, (fields of a track,).
-
-        ``height`` is what is commanded, m, ``force`` pushes the base up, N.
-
-        Raises:
-            PhysicsError: The simulation became unstable.
-        """
-        legs = self._legs
-        if force != self._force:
-            self._force = force
-            legs.push(np.array([force]))
-        row = np.empty(len(FIELDS))
-        row[:3] = height, legs.height[0], legs.height_rate[0]
-        row[3:5] = legs.q[0]
-        row[7] = legs.foot_clearance()[0]
-        torque = self.controller.act(self._plant.sense(np.array([height])))
-        row[5:7] = self._plant.drive(torque)[0]
-        row[8] = self.controller.internals().get("phase", np.array([np.nan]))[0]
-        if not np.abs(legs.qd).max() < _IMPOSSIBLE:
-            raise PhysicsError(f"The simulation of {legs.robot.name} became unstable.")
-        return row
-
-    def _restart(self, height: float) -> None:
-        self._plant.channel.restart(_ALL, self._legs.q, self._legs.qd, np.array([height]))
-
-
-def _simulator(robot: Robot, *, in_mujoco: bool) -> LegSimulator | MujocoSimulator:
-    kind = MujocoSimulator if in_mujoco else LegSimulator
-    return kind(robot, 1, rate=CONTROL_RATE, threads=1)

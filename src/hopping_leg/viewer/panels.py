@@ -1,8 +1,8 @@
-"""Inputs of the page, the queue that carries them to the thread that simulates, its clock."""
+"""Inputs of the page, what carries them to the thread that simulates, the clock of the pictures."""
 
 from collections.abc import Callable, Collection, Coroutine
-from queue import Empty, SimpleQueue
-from typing import Any, NamedTuple
+from queue import SimpleQueue
+from typing import Any
 
 import viser
 
@@ -10,16 +10,11 @@ from hopping_leg.controllers.registry import controller_names
 from hopping_leg.errors import HoppingLegError, UsageError
 from hopping_leg.io import is_number, one_line
 from hopping_leg.robot import load_robot, shipped_robots
-from hopping_leg.viewer import data_source, live_leg
+from hopping_leg.viewer import live_leg, tracks
 from hopping_leg.viewer.live_leg import Range
 
-Action = Callable[[], None]
+Action = Callable[[], object]
 _ROUNDING = 1e-6  # Of the page's numbers
-
-
-def put_value(handle: Any, value: object) -> None:  # noqa: ANN401
-    """Set an input of the page; viser's types take its values for read-only."""
-    handle.value = value
 
 
 def chosen(handle: Any, offered: Collection[str]) -> str:  # noqa: ANN401
@@ -37,42 +32,63 @@ def within(handle: Any, bounds: Range) -> float:  # noqa: ANN401
     return float(min(max(value, low), high))
 
 
-class GuiQueue:
-    """Actions in the order in which they came; callbacks of the page only put them in."""
+class Inputs:
+    """Adds inputs and keys to the page; what they ask for waits for the thread that simulates."""
 
-    def __init__(self) -> None:
-        self._actions: SimpleQueue[Action] = SimpleQueue()
+    def __init__(self, server: viser.ViserServer) -> None:
+        self.gui: Any = server.gui
+        self._asked: SimpleQueue[Action] = SimpleQueue()
 
     def put(self, action: Action) -> None:
-        """Queue an action; any thread may."""
-        self._actions.put(action)
+        """Let an action wait; any thread may."""
+        self._asked.put(action)
 
     def run(self) -> list[str]:
-        """Run all queued actions; return the sentences of those that failed."""
+        """Do what was asked for, in its order; return the sentences of what failed."""
         complaints: list[str] = []
-        while True:
+        while not self._asked.empty():
             try:
-                action = self._actions.get_nowait()
-            except Empty:
-                return complaints
-            try:
-                action()
+                self._asked.get()()
             except HoppingLegError as error:
                 complaints.append(str(error))
+        return complaints
 
-    def from_page(self, action: Action) -> Callable[[Any], Coroutine[Any, Any, None]]:
-        """Return a callback for an input or key; what the server itself sets is no action."""
+    def slider(
+        self, label: str, bounds: Range, step: float, value: float, action: Action, hint: str = ""
+    ) -> Any:  # noqa: ANN401
+        """Add a slider."""
+        low, high = bounds
+        slider = self.gui.add_slider(
+            label, min=low, max=high, step=step, initial_value=value, hint=hint or None
+        )
+        slider.on_update(self.asking(action))
+        return slider
+
+    def choice(self, label: str, offered: tuple[str, ...], value: str, action: Action) -> Any:  # noqa: ANN401
+        """Add a list of what can be chosen."""
+        choice = self.gui.add_dropdown(label, offered, initial_value=value)
+        choice.on_update(self.asking(action))
+        return choice
+
+    def button(self, label: str, key: str, icon: Any, action: Action) -> Any:  # noqa: ANN401
+        """Add a button that has a key, too."""
+        self.key(label, key, action)
+        button = self.gui.add_button(label, icon=icon, hint=f"Key {key}")
+        button.on_click(self.asking(action))
+        return button
+
+    def key(self, label: str, key: str, action: Action) -> None:
+        """Let a key do something."""
+        self.gui.add_command(label, hotkey=key).on_trigger(self.asking(action))
+
+    def asking(self, action: Action) -> Callable[[Any], Coroutine[Any, Any, None]]:
+        """Return viser's callback for an action; what the server itself sets asks for nothing."""
 
         async def callback(event: viser.GuiEvent[Any] | viser.CommandEvent) -> None:
             if event.client is not None:
                 self.put(action)
 
         return callback
-
-    def add_keys(self, gui: viser.GuiApi, *keys: tuple[str, Any, Action]) -> None:
-        """Let keys of the page, each with what it is called, do something."""
-        for label, key, action in keys:
-            gui.add_command(label, hotkey=key).on_trigger(self.from_page(action))
 
 
 NOBODY = "nobody"  # beside the leg
@@ -81,79 +97,58 @@ KEY_STEP = 0.01
 """Of the keys K and J, m; arrows are the slider's own once it has the focus."""
 
 
-class _Setting(NamedTuple):
-    label: str
-    valid: Range
-    scale: float  # shown over stored unit
-    step: float  # as shown
-    hint: str | None = None
-
-
-_SETTINGS = {
-    "payload": _Setting("Payload, kg", live_leg.PAYLOAD, 1.0, 0.05),
-    "time_constant": _Setting(
-        "Ground, ms", live_leg.TIME_CONSTANT, 1e3, 1.0, "Time constant; small is hard"
-    ),
-    "delay": _Setting("Delay, ms", live_leg.DELAY, 1e3, 0.5, "Of commands, beyond the robot's own"),
+_SETTINGS: dict[str, tuple[str, Range, float]] = {
+    "payload": ("Payload, kg", live_leg.PAYLOAD, 0.05),
+    "time_constant": ("Soft ground, s", live_leg.TIME_CONSTANT, 1e-3),
+    "delay": ("Delay, s", live_leg.DELAY, 5e-4),
 }
+"""What each is called, what it can be, and the slider's step."""
 
 
 class LivePanel:
     """Puts what the page asks for to a live simulation."""
 
-    def __init__(
-        self, server: viser.ViserServer, queue: GuiQueue, live: live_leg.LiveSimulation
-    ) -> None:
-        self._live = live
-        gui = server.gui
+    def __init__(self, inputs: Inputs, live: live_leg.LiveSimulation) -> None:
+        self._live, gui = live, inputs.gui
         hint = "Commanded apex; keys K and J"
-        self._height = _slider(gui, "Height, m", live.valid, HEIGHT_STEP, live.height, hint)
-        self._height.on_update(queue.from_page(self._set_height))
+        self._height = inputs.slider(
+            "Height, m", live.valid, HEIGHT_STEP, live.height, self._set_height, hint
+        )
+        inputs.key("Higher", "K", lambda: self._change(KEY_STEP))
+        inputs.key("Lower", "J", lambda: self._change(-KEY_STEP))
         names = self._names = tuple(dict.fromkeys((*controller_names(), *live.names)))
-        self._first = gui.add_dropdown("Controller", names, initial_value=live.names[0])
-        beside = live.names[1] if len(live.names) > 1 else NOBODY
-        self._second = gui.add_dropdown("Beside it", (NOBODY, *names), initial_value=beside)
         legs = [name for name in shipped_robots() if load_robot(name).kind == "leg"]
-        self._robots = tuple(dict.fromkeys((*legs, live.robot_name)))
-        self._robot = gui.add_dropdown("Robot", self._robots, initial_value=live.robot_name)
-        for dropdown in (self._first, self._second, self._robot):
-            dropdown.on_update(queue.from_page(self._begin))
-        stand = gui.add_button("Stand up", icon=viser.Icon.RELOAD, hint="Begin anew; key R")
-        stand.on_click(queue.from_page(live.stand))
+        robots = self._robots = tuple(dict.fromkeys((*legs, live.robot_name)))
+        first, beside = self._shown_names()
+        self._first = inputs.choice("Controller", names, first, self._begin)
+        self._second = inputs.choice("Beside it", (NOBODY, *names), beside, self._begin)
+        self._robot = inputs.choice("Robot", robots, live.robot_name, self._begin)
+        inputs.button("Stand up", "R", viser.Icon.RELOAD, live.stand)
         with gui.add_folder("Not told to the controller"):
             self._sliders = {
-                name: _slider(gui, s.label, _shown(s), s.step, self._setting(name), s.hint)
-                for name, s in _SETTINGS.items()
+                name: inputs.slider(*shown, getattr(live.settings, name), self._settings)
+                for name, shown in _SETTINGS.items()
             }
             hint = "The paper's noise and random delay of measurements"
             self._noise = gui.add_checkbox("Noise", live.settings.noise, hint=hint)
-        self._noise.on_update(queue.from_page(self._settings))
-        for slider in self._sliders.values():
-            slider.on_update(queue.from_page(self._settings))
+            self._noise.on_update(inputs.asking(self._settings))
         with gui.add_folder("Push the base"):
-            force = _slider(gui, "Force, N", live_leg.PUSH, 1.0, 30.0)
-            up = gui.add_button("Push up", icon=viser.Icon.ARROW_UP, hint="Key P")
-            down = gui.add_button("Push down", icon=viser.Icon.ARROW_DOWN, hint="Key O")
+            force = inputs.slider("Force, N", live_leg.PUSH, 1.0, 30.0, lambda: None)
+            for label, key, icon, sign in (
+                ("Push up", "P", viser.Icon.ARROW_UP, 1),
+                ("Push down", "O", viser.Icon.ARROW_DOWN, -1),
+            ):
 
-        def push(sign: int) -> None:
-            live.push(sign * within(force, live_leg.PUSH))
+                def push(sign: int = sign) -> None:
+                    live.push(sign * within(force, live_leg.PUSH))
 
-        up.on_click(queue.from_page(lambda: push(1)))
-        down.on_click(queue.from_page(lambda: push(-1)))
-        queue.add_keys(
-            gui,
-            ("Higher", "K", lambda: self._change(KEY_STEP)),
-            ("Lower", "J", lambda: self._change(-KEY_STEP)),
-            ("Push up", "P", lambda: push(1)),
-            ("Push down", "O", lambda: push(-1)),
-            ("Stand up", "R", live.stand),
-        )
+                inputs.button(label, key, icon, push)
 
     def _set_height(self) -> None:
         self._live.set_height(within(self._height, self._live.valid))
 
     def _change(self, by: float) -> None:
-        put_value(self._height, self._live.set_height(self._live.height + by))
+        self._height.value = self._live.set_height(self._live.height + by)
 
     def _begin(self) -> None:
         try:
@@ -165,64 +160,37 @@ class LivePanel:
             self._show()
 
     def _settings(self) -> None:
-        values = {
-            name: within(self._sliders[name], _shown(setting)) / setting.scale
-            for name, setting in _SETTINGS.items()
-        }
+        values = {n: within(self._sliders[n], bounds) for n, (_, bounds, _) in _SETTINGS.items()}
         self._live.set_settings(live_leg.LiveSettings(noise=self._noise.value, **values))
 
-    def _setting(self, name: str) -> float:
-        """Return one as it is shown."""
-        return _SETTINGS[name].scale * float(getattr(self._live.settings, name))
+    def _shown_names(self) -> tuple[str, str]:
+        first, *others = self._live.names
+        return first, others[0] if others else NOBODY
 
     def _show(self) -> None:
         """Bring all inputs in line with the simulation, which may have refused."""
         live = self._live
         self._height.min, self._height.max = live.valid
-        put_value(self._height, live.height)
-        put_value(self._first, live.names[0])
-        put_value(self._second, live.names[1] if len(live.names) > 1 else NOBODY)
-        put_value(self._robot, live.robot_name)
-        put_value(self._noise, live.settings.noise)
+        self._height.value = live.height
+        self._first.value, self._second.value = self._shown_names()
+        self._robot.value = live.robot_name
+        self._noise.value = live.settings.noise
         for name, slider in self._sliders.items():
-            put_value(slider, self._setting(name))
-
-
-def _shown(setting: _Setting) -> Range:
-    low, high = setting.valid
-    return setting.scale * low, setting.scale * high
-
-
-def _slider(
-    gui: viser.GuiApi,
-    label: str,
-    bounds: Range,
-    step: float,
-    value: float,
-    hint: str | None = None,
-) -> viser.GuiSliderHandle[float]:
-    low, high = bounds
-    return gui.add_slider(label, min=low, max=high, step=step, initial_value=value, hint=hint)
+            slider.value = getattr(live.settings, name)
 
 
 class ReplayPanel:
     """A slider for the time, which follows the replay as it plays."""
 
-    def __init__(
-        self, server: viser.ViserServer, queue: GuiQueue, replay: data_source.ReplaySource
-    ) -> None:
-        self._replay = replay
-        self._time = server.gui.add_slider(
-            "Time, s", min=0.0, max=replay.length, step=0.01, initial_value=0.0
-        )
-        self._time.on_update(queue.from_page(self._seek))
-        self._shown = 0.0
+    def __init__(self, inputs: Inputs, replay: tracks.ReplaySource) -> None:
+        self._replay, self._shown = replay, 0.0
+        self._time = inputs.slider("Time, s", (0.0, replay.length), 0.01, 0.0, self._seek)
 
     def show(self) -> None:
         """Bring the slider in line with the replay, unless it was the slider that moved it."""
         if self._replay.now != self._shown:
             self._shown = self._replay.now
-            put_value(self._time, round(self._shown, 2))
+            self._time.value = round(self._shown, 2)
 
     def _seek(self) -> None:
         self._replay.seek(within(self._time, (0.0, self._replay.length)))
@@ -263,36 +231,16 @@ class PlaybackClock:
         return ticks * self._tick
 
 
-class TimeControls:
-    """Pause, step and speed, by buttons and keys."""
+def add_time_controls(inputs: Inputs, clock: PlaybackClock) -> None:
+    """Let the page pause, step and choose the speed."""
 
-    def __init__(self, server: viser.ViserServer, queue: GuiQueue, clock: PlaybackClock) -> None:
-        self._clock = clock
-        gui = server.gui
-        self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, hint="Space")
-        step = gui.add_button("Single step", icon=viser.Icon.PLAYER_SKIP_FORWARD, hint="Key S")
-        names = tuple(f"{speed:g}" for speed in SPEEDS)
-        speed = gui.add_dropdown("Speed", names, initial_value="1", hint="1 is real time")
-        self._pause.on_click(queue.from_page(self._toggle))
-        step.on_click(queue.from_page(self._step))
+    def pause() -> None:
+        clock.paused = not clock.paused
 
-        def set_speed() -> None:
-            clock.speed = float(chosen(speed, names))
+    def set_speed() -> None:
+        clock.speed = float(chosen(speed, names))
 
-        speed.on_update(queue.from_page(set_speed))
-        queue.add_keys(
-            gui, ("Pause or go on", "space", self._toggle), ("Single step", "S", self._step)
-        )
-
-    def _toggle(self) -> None:
-        self._clock.paused = not self._clock.paused
-        self._label()
-
-    def _step(self) -> None:
-        self._clock.step()
-        self._label()
-
-    def _label(self) -> None:
-        paused = self._clock.paused
-        self._pause.label = "Go on" if paused else "Pause"
-        self._pause.icon = viser.Icon.PLAYER_PLAY if paused else viser.Icon.PLAYER_PAUSE
+    inputs.button("Pause or go on", "space", viser.Icon.PLAYER_PAUSE, pause)
+    inputs.button("Single step", "S", viser.Icon.PLAYER_SKIP_FORWARD, clock.step)
+    names = tuple(f"{speed:g}" for speed in SPEEDS)
+    speed = inputs.choice("Speed", names, "1", set_speed)

@@ -1,4 +1,4 @@
-"""The scene: legs as shapes, side by side, the commanded height, the last apex of each."""
+"""What is drawn of tracks: legs side by side with their marks, and curves of the last seconds."""
 
 import math
 from collections.abc import Sequence
@@ -10,7 +10,8 @@ import viser
 
 from hopping_leg.arrays import Array
 from hopping_leg.colours import COLOURS, COMMAND, controller_colours, rgb
-from hopping_leg.robot import Robot, build_model
+from hopping_leg.hop_detection import FLIGHT_CLEARANCE
+from hopping_leg.robot import JOINTS, Robot, build_model
 from hopping_leg.viewer.tracks import Track
 
 Colour = tuple[int, int, int]
@@ -32,6 +33,23 @@ _ACROSS = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
 """Turns a cylinder's axis from z to y, that of the joints."""
 
 
+SECONDS = 5.0
+"""Of the curves."""
+
+_GRID = np.linspace(-SECONDS, 0.0, 400)
+_LIMIT = "#9a9996"
+_AXIS = {
+    "stroke": "#59636e",
+    "font": "12px system-ui, sans-serif",
+    "grid": {"width": 1},
+    "ticks": {"width": 1, "size": 5},
+}
+_PHASES = ("stance", "flight", "landing")
+
+_Curve = tuple[dict[str, Any], Array]
+"""Its look and its values, (times,)."""
+
+
 def track_colours(tracks: Sequence[Track]) -> list[str]:
     """Return the colour of each leg and of its curves: its controller's, if they are different."""
     names = [track.name for track in tracks]
@@ -48,12 +66,6 @@ class _Leg(NamedTuple):
     base: viser.FrameHandle
     thigh: viser.FrameHandle
     shank: viser.FrameHandle
-
-    def pose(self, height: float, q: Array) -> None:
-        """Move the leg: base height, m, and joint angles, rad, (2,)."""
-        self.base.position = (0.0, 0.0, height)
-        self.thigh.wxyz = _turned(q[0])
-        self.shank.wxyz = _turned(q[1])
 
 
 def _add_leg(scene: viser.SceneApi, number: int, robot: Robot, colour: Colour) -> _Leg:
@@ -113,49 +125,6 @@ def _turned(angle: float) -> Array:
     return np.array([math.cos(angle / 2), 0.0, -math.sin(angle / 2), 0.0])
 
 
-class Scene:
-    """Draws tracks; call ``show`` for every picture."""
-
-    def __init__(self, server: viser.ViserServer) -> None:
-        self._server = server
-        self._legs: list[_Leg] = []
-        self._tracks: list[Track] = []
-        _light(server.scene)
-        _add_floor(server.scene)
-
-    def show(self, tracks: list[Track], now: float) -> None:
-        """Draw the legs as they are at a time, s; other legs than before are put up first."""
-        if tracks is not self._tracks:
-            self._build(tracks)
-        with self._server.atomic():
-            for leg, track in zip(self._legs, tracks, strict=True):
-                if len(track):
-                    leg.pose(*track.moment(now))
-
-    def mark(self, now: float) -> None:
-        """Move the marks of command and last apex; may be called less often than ``show``."""
-        for leg, track in zip(self._legs, self._tracks, strict=True):
-            _put(leg.command, track.latest("command_m", now))
-            _put(leg.apex, track.last_apex(now))
-
-    def _build(self, tracks: list[Track]) -> None:
-        """Put up the legs; turn all cameras, also those of pages that are open, to them."""
-        for leg in self._legs:
-            leg.root.remove()
-        self._tracks = tracks
-        shown = zip(tracks, track_colours(tracks), strict=True)
-        self._legs = [
-            _add_leg(self._server.scene, number, track.robot, rgb(colour))
-            for number, (track, colour) in enumerate(shown)
-        ]
-        middle = _APART * (len(tracks) - 1) / 2
-        look_at, position = (middle, 0.0, 0.25), (middle + 0.12, -_AWAY - 3 * middle, 0.38)
-        self._server.initial_camera.fov = _FIELD_OF_VIEW
-        cameras: list[Any] = [c.camera for c in self._server.get_clients().values()]
-        for camera in (self._server.initial_camera, *cameras):
-            camera.position, camera.look_at = position, look_at
-
-
 def _put(bar: viser.BoxHandle, height: float) -> None:
     """Move a mark, if it has anywhere to be; what does not change is not sent."""
     known = bool(np.isfinite(height))
@@ -165,31 +134,129 @@ def _put(bar: viser.BoxHandle, height: float) -> None:
         bar.visible = known
 
 
-def _light(scene: viser.SceneApi) -> None:
-    """Light the scene cheaply: shadows and reflections cost most where there is no GPU."""
-    scene.set_up_direction("+z")
-    scene.configure_environment_map(None)
-    scene.configure_default_lights(enabled=False)
-    scene.add_light_ambient("/light/all", intensity=1.6)
-    scene.add_light_directional("/light/sun", intensity=2.6, position=(-0.5, -1.2, 1.6))
-
-
 def _add_floor(scene: viser.SceneApi) -> None:
     """Lay out a floor with lines every 0.1 m."""
     (x, y), thick = _FLOOR, 0.02
-    scene.add_box(
-        "/floor/slab",
-        (226, 230, 235),
-        (2 * x, 2 * y, thick),
-        position=(0.0, 0.0, -thick / 2),
-        **PLAIN,
-    )
-    lines = [((at, -y, 0.0), (at, y, 0.0)) for at in np.arange(-x, x + 0.05, 0.1)]
-    lines += [((-x, at, 0.0), (x, at, 0.0)) for at in np.arange(-y, y + 0.05, 0.1)]
-    scene.add_line_segments(
-        "/floor/lines",
-        np.array(lines) + np.array([0.0, 0.0, 0.0005]),
-        (196, 202, 210),
-        thickness=1.0,
-        thickness_units="screen",
-    )
+    slab, under = (2 * x, 2 * y, thick), (0.0, 0.0, -thick / 2)
+    scene.add_box("/floor/slab", (226, 230, 235), slab, position=under, **PLAIN)
+    above = 0.0005  # the slab, m
+    lines = [((at, -y, above), (at, y, above)) for at in np.arange(-x, x + 0.05, 0.1)]
+    lines += [((-x, at, above), (x, at, above)) for at in np.arange(-y, y + 0.05, 0.1)]
+    look: Any = {"thickness": 1.0, "thickness_units": "screen"}
+    scene.add_line_segments("/floor/lines", np.array(lines), (196, 202, 210), **look)
+
+
+class Scene:
+    """Draws tracks, their curves in a panel of the page; call ``show`` for every picture."""
+
+    def __init__(self, server: viser.ViserServer, panel: Any) -> None:  # noqa: ANN401
+        self._server, self._panel = server, panel
+        self._tracks: list[Track] = []
+        self._legs: list[_Leg] = []
+        self._plots: list[Any] = []
+        scene = server.scene
+        scene.set_up_direction("+z")
+        scene.configure_environment_map(None)  # reflections and shadows cost most without a GPU
+        scene.configure_default_lights(enabled=False)
+        scene.add_light_ambient("/light/all", intensity=1.6)
+        scene.add_light_directional("/light/sun", intensity=2.6, position=(-0.5, -1.2, 1.6))
+        _add_floor(scene)
+
+    def show(self, tracks: list[Track], now: float, turn: int) -> None:
+        """Draw the legs at a time, s, and what has its turn: one of four plots, or the marks.
+
+        All of them at once would cost a browser without a GPU a picture.
+        """
+        if tracks is not self._tracks:
+            self._build(tracks, now)
+        with self._server.atomic():
+            for leg, track in zip(self._legs, tracks, strict=True):
+                if len(track):
+                    height, (hip, knee) = track.moment(now)
+                    leg.base.position = (0.0, 0.0, height)
+                    leg.thigh.wxyz, leg.shank.wxyz = _turned(hip), _turned(knee)
+        if turn < len(self._plots):
+            self._plots[turn].data = _plots(tracks, now + _GRID)[turn]["data"]
+        elif turn == len(self._plots):
+            for leg, track in zip(self._legs, tracks, strict=True):
+                _put(leg.command, track.latest("command_m", now))
+                _put(leg.apex, track.last_apex(now))
+
+    def _build(self, tracks: list[Track], now: float) -> None:
+        """Put up other legs and plots; turn all cameras, also those of open pages, to the legs."""
+        for gone in (*(leg.root for leg in self._legs), *self._plots):
+            gone.remove()
+        self._tracks, gui = tracks, self._server.gui
+        shown = zip(tracks, track_colours(tracks), strict=True)
+        self._legs = [
+            _add_leg(self._server.scene, number, track.robot, rgb(colour))
+            for number, (track, colour) in enumerate(shown)
+        ]
+        with self._panel:
+            self._plots = [gui.add_uplot(**plot) for plot in _plots(tracks, now + _GRID)]
+        middle = _APART * (len(tracks) - 1) / 2
+        look_at, position = (middle, 0.0, 0.25), (middle + 0.12, -_AWAY - 3 * middle, 0.38)
+        self._server.initial_camera.fov = _FIELD_OF_VIEW
+        cameras: list[Any] = [c.camera for c in self._server.get_clients().values()]
+        for camera in (self._server.initial_camera, *cameras):
+            camera.position, camera.look_at = position, look_at
+
+
+def _plots(tracks: list[Track], time: Array) -> list[dict[str, Any]]:
+    """Return all that each plot of some legs over the time, s, consists of."""
+    if not tracks:
+        return []
+    names, colours = [track.name for track in tracks], track_colours(tracks)
+    shown = [track.sample(time) for track in tracks]
+
+    def each(field: str, label: str = "{}", **look: Any) -> list[_Curve]:  # noqa: ANN401
+        return [
+            (_line(label.format(name), colour, **look), sample[field])
+            for name, colour, sample in zip(names, colours, shown, strict=True)
+        ]
+
+    robot = tracks[0].robot
+    command = _line("command", COMMAND, width=2, dash=(6, 4)), shown[0]["command_m"]
+    heights, tall = [command, *each("height_m")], 1.5 * robot.straight_height
+    plots = [_plot("Height / m over time / s", time, heights, (0.0, tall), 170)]
+    for joint in JOINTS:
+        most = getattr(robot, joint).torque_limit
+        limits = [
+            (_line(f"{side} limit", _LIMIT, width=1, dash=(4, 4)), np.full(len(time), limit))
+            for side, limit in (("upper", most), ("lower", -most))
+        ]
+        title, curves = f"{joint.capitalize()} torque / N m", limits + each(f"{joint}_torque_nm")
+        plots.append(_plot(title, time, curves, (-1.15 * most, 1.15 * most), 130))
+    for sample in shown:
+        clearance = sample["foot_clearance_m"]
+        known = np.isfinite(clearance)
+        sample["flight"] = np.where(known, 1.0 * (clearance >= FLIGHT_CLEARANCE), np.nan)
+    phases = each("flight", "{}, in the air", width=2)
+    phases += each("phase", "{}, its phase", width=1, dash=(2, 2))
+    title = "Phase: foot (solid), the controller's own (dashed)"
+    ticks = {"splits": list(range(len(_PHASES))), "values": list(_PHASES)}
+    return [*plots, _plot(title, time, phases, (-0.2, 2.2), 120, **ticks)]
+
+
+def _plot(
+    title: str,
+    time: Array,
+    curves: list[_Curve],
+    bounds: tuple[float, float],
+    height: int,
+    **axis: Any,  # noqa: ANN401
+) -> dict[str, Any]:
+    return {
+        "data": (time, *(values for _, values in curves)),
+        "series": ({}, *(line for line, _ in curves)),
+        "title": title,
+        "scales": {"x": {"time": False}, "y": {"range": bounds}},
+        "axes": ({**_AXIS, "size": 28}, {**_AXIS, "size": 62, **axis}),
+        "legend": {"show": False},
+        "height": height,
+        "padding": (4, 10, 0, 0),
+    }
+
+
+def _line(label: str, colour: str, width: float = 1.5, **more: Any) -> dict[str, Any]:  # noqa: ANN401
+    return {"label": label, "stroke": colour, "width": width, "points": {"show": False}, **more}

@@ -1,16 +1,24 @@
-"""What is shown of one leg, whatever it comes from: rows over time.
+"""What is shown: one leg's rows over time, from a live simulation, stored traces or `hop deploy`.
 
 A live simulation appends rows as it goes, a replay has them all, a run on the real leg grows from
-outside; scene and plots know nothing but tracks.
+outside; scene and curves know nothing but tracks.
 """
+
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 import polars as pl
 
-from hopping_leg import hop_detection
-from hopping_leg.arrays import Array
-from hopping_leg.robot import Robot, kinematics
+from hopping_leg import errors, hop_detection
+from hopping_leg.arrays import Array, IntArray
+from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorderTail
+from hopping_leg.robot import Robot, kinematics, load_robot
+from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.trace import Trace
+
+MOST = 2
+"""Legs side by side."""
 
 FIELDS = (
     "command_m",
@@ -27,7 +35,6 @@ FIELDS = (
 
 _ANGLES = ("hip_position_rad", "knee_position_rad")
 _ESTIMATE = "estimated_height_m"
-_APEX_SECONDS = 3.0
 
 
 class Track:
@@ -98,40 +105,175 @@ class Track:
 
     def latest(self, name: str, time: float) -> float:
         """Return a field of the last row up to a time, NaN if there is none."""
-        row = int(np.searchsorted(self.time, time + 1e-9, side="right")) - 1
+        row = int(self._rows_until(np.array(time)))
         return float(self.field(name)[row]) if row >= 0 else float("nan")
 
     def sample(self, grid: Array) -> dict[str, Array]:
         """Return every field at rising times, NaN where there is no row, (times,) each."""
-        time = self.time
-        if not len(time):
-            return {name: np.full(len(grid), np.nan) for name in FIELDS}
-        near = np.clip(np.searchsorted(time, grid + 1e-9, side="right") - 1, 0, None)
-        outside = (grid < time[0] - 1e-9) | (grid > time[-1] + 1e-9)
-        taken = self._rows[1:, near]
-        taken[:, outside] = np.nan
-        return dict(zip(FIELDS, taken, strict=True))
+        late = grid > self.time.max(initial=-np.inf) + 1e-9
+        rows = np.where(late, -1, self._rows_until(grid))
+        shown = self._rows[1:, rows] if len(self) else np.empty((len(FIELDS), len(grid)))
+        shown[:, rows < 0] = np.nan
+        return dict(zip(FIELDS, shown, strict=True))
 
-    def apexes(self, until: float, seconds: float) -> Array:
+    def _rows_until(self, times: Array) -> IntArray:
+        """Return the number of the last row up to each time, -1 if there is none."""
+        return np.searchsorted(self.time, times + 1e-9, side="right") - 1
+
+    def apexes(self, until: float, seconds: float = 3.0) -> Array:
         """Return the heights of the apexes in the ``seconds`` up to a time, m, (hops,)."""
         first, last = np.searchsorted(self.time, [until - seconds, until + 1e-9])
-        part = slice(int(first), int(last))
         names = ("height_m", "height_rate_m_s", "foot_clearance_m")
-        height, rate, clearance = (self.field(name)[part] for name in names)
-        if len(height) < 2:
-            return np.zeros(0)
-        return hop_detection.find_hops(height, rate, clearance).apex
+        part = [self.field(name)[first:last] for name in names]
+        return hop_detection.find_hops(*part).apex if last - first > 1 else np.zeros(0)
 
     def last_apex(self, until: float) -> float:
         """Return the height of the last apex up to a time, m, NaN if it is long ago."""
-        apexes = self.apexes(until, _APEX_SECONDS)
-        return float(apexes[-1]) if len(apexes) else float("nan")
+        return float(np.append(np.nan, self.apexes(until))[-1])
 
 
-def in_flight(clearance: Array) -> Array:
-    """Return 1 where the foot is in the air, 0 where it is not, NaN where that is unknown."""
-    return np.where(
-        np.isfinite(clearance),
-        (clearance >= hop_detection.FLIGHT_CLEARANCE).astype(np.float64),
-        np.nan,
-    )
+class DataSource(Protocol):
+    """A live simulation, a replay, or a run on the real leg."""
+
+    tracks: list[Track]  # one per leg
+    now: float  # time that is shown, s
+    notices: list[str]  # to be told; whoever shows them empties the list
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass."""
+        ...
+
+
+class ReplaySource:
+    """One or two traces side by side; both begin at zero.
+
+    Args:
+        paths: Of the traces.
+        robot: Name or file of the leg; none takes the one that each trace names.
+
+    Raises:
+        TraceError: A trace cannot be read or holds no tick.
+        RobotError: A trace's robot is no shipped one and ``robot`` was not given.
+        UsageError: There are too many traces.
+    """
+
+    def __init__(self, paths: tuple[Path, ...], robot: str | None = None) -> None:
+        if not 1 <= len(paths) <= MOST:
+            raise errors.UsageError(
+                f"{len(paths)} traces were given; give one, or two side by side."
+            )
+        self.notices: list[str] = []
+        self.now = 0.0
+        self.tracks = [self._load(path, robot) for path in paths]
+        for track in self.tracks:
+            track.time[:] -= track.time[0]
+        self.length = max(float(track.time[-1]) for track in self.tracks)
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass; the end is followed by the beginning."""
+        self.now += seconds
+        if self.now > self.length:
+            self.now = 0.0
+
+    def seek(self, time: float) -> None:
+        """Show another time, s."""
+        self.now = min(max(time, 0.0), self.length)
+
+    def _load(self, path: Path, robot: str | None) -> Track:
+        stored = Trace.load(path)
+        if not len(stored.table):
+            raise errors.TraceError(f"{path} holds no tick; there is nothing to show.")
+        leg = _load_leg(robot, stored.header, path)
+        if not leg.has_digest(stored.header.get("robot_digest", leg.digest)):
+            self.notices.append(
+                f"{path.name} was recorded from other parameters than those of {leg.name}."
+            )
+        track = Track(str(stored.header.get("controller", path.stem)), leg)
+        track.extend_by_trace(stored)
+        return track
+
+
+def _load_leg(robot: str | None, header: dict[str, Any], path: Path) -> Robot:
+    """Return the robot asked for, else the one that a recording names."""
+    name = str(header.get("robot", ""))
+    try:
+        leg = load_robot(robot or name)
+    except errors.RobotError as error:
+        if robot:
+            raise
+        raise errors.RobotError(
+            f"{path} is of '{name}', which is no shipped robot; give its file with --robot."
+        ) from error
+    leg.require_leg()
+    return leg
+
+
+KEPT_SECONDS = 20.0
+"""Of the past."""
+
+_LOOK = 0.5
+"""Seconds between looks for a newer run."""
+
+
+class RecorderSource:
+    """Shows the newest run; the robot that runs it learns nothing of it.
+
+    Args:
+        path: Of a black box, or of the folder in which `hop deploy` writes them.
+        robot: Name or file of the leg; none takes the one that the run names.
+
+    Raises:
+        UsageError: There is neither such a file nor such a folder.
+    """
+
+    def __init__(self, path: Path, robot: str | None = None) -> None:
+        if not path.exists():
+            raise errors.UsageError(
+                f"There is no {path}; give a {SUFFIX} file or the folder of `hop deploy --out`."
+            )
+        self.tracks: list[Track] = []
+        self.notices: list[str] = []
+        self.now = 0.0
+        self._path, self._robot = path, robot
+        self._tail: FlightRecorderTail | None = None
+        self._over = False
+        self._wait = 0.0
+        if path.is_dir():
+            self.notices.append(f"Waiting for a run in {path}.")
+
+    def advance(self, seconds: float) -> None:
+        """Read what is new.
+
+        Raises:
+            RobotError: The run's robot is no shipped one and none was given.
+            TraceError: The file is no flight recording.
+        """
+        self._wait -= seconds
+        if self._wait <= 0:
+            self._wait = _LOOK
+            self._look()
+        rows = self._tail.rows() if self._tail else ()
+        if self._tail is None or not len(rows):
+            return
+        if not self.tracks:
+            header, depth = self._tail.header, round(KEPT_SECONDS * CONTROL_RATE)
+            robot = _load_leg(self._robot, header, self._tail.path)
+            self.tracks = [Track(str(header.get("controller", "")), robot, depth=depth)]
+        table = pl.DataFrame(rows, schema=list(self._tail.columns), orient="row")
+        self.tracks[0].extend_by_trace(Trace(table))
+        self.now = float(self.tracks[0].time[-1])
+
+    def _look(self) -> None:
+        """Turn to a newer run, if there is one; say when this one is over."""
+        if self._tail is not None and self._tail.over and not self._over:
+            self._over = True
+            self.notices.append("The run is over; its trace is on disk.")
+        boxes = [self._path]
+        if self._path.is_dir():  # of those written in one tick of the file system, the last by name
+            boxes = sorted(self._path.glob(f"*{SUFFIX}"), key=lambda b: (b.stat().st_mtime_ns, b))
+        if not boxes or (self._tail is not None and boxes[-1] == self._tail.path):
+            return
+        if self._tail is not None:
+            self._tail.close()
+        self._tail, self._over, self.tracks, self.now = FlightRecorderTail(boxes[-1]), False, [], 0
+        self.notices.append(f"Following {boxes[-1].name}.")

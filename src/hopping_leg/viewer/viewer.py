@@ -26,7 +26,7 @@ from websockets.http11 import Request, Response
 from hopping_leg.colours import COLOURS, rgb
 from hopping_leg.errors import UsageError
 from hopping_leg.sim import CONTROL_RATE
-from hopping_leg.viewer import charts, data_source, live_leg, panels, scene
+from hopping_leg.viewer import live_leg, panels, scene, tracks
 
 _HOST = "127.0.0.1"
 _OWN = ("localhost", "127.0.0.1", "::1")
@@ -50,12 +50,12 @@ class Viewer:
         UsageError: There is no such port.
     """
 
-    def __init__(self, source: data_source.DataSource, *, port: int = 8080) -> None:
+    def __init__(self, source: tracks.DataSource, *, port: int = 8080) -> None:
         self._source = source
         self._server = _serve(port)
         self.address = f"http://{_HOST}:{self._server.get_port()}"
         self.clock = panels.PlaybackClock(1 / CONTROL_RATE)
-        self._queue = panels.GuiQueue()
+        self._inputs = panels.Inputs(self._server)
         gui = self._server.gui
         brand = rgb(COLOURS[0])
         gui.configure_theme(show_logo=False, show_share_button=False, brand_color=brand)
@@ -65,16 +65,15 @@ class Viewer:
         self._status = gui.add_html("")
         self._replay_panel: panels.ReplayPanel | None = None
         if isinstance(source, live_leg.LiveSimulation):
-            panels.LivePanel(self._server, self._queue, source)
-        if isinstance(source, data_source.ReplaySource):
-            self._replay_panel = panels.ReplayPanel(self._server, self._queue, source)
-        if not isinstance(source, data_source.RecorderSource):
-            panels.TimeControls(self._server, self._queue, self.clock)
+            panels.LivePanel(self._inputs, source)
+        if isinstance(source, tracks.ReplaySource):
+            self._replay_panel = panels.ReplayPanel(self._inputs, source)
+        if not isinstance(source, tracks.RecorderSource):
+            panels.add_time_controls(self._inputs, self.clock)
         panel = gui.add_panel()
-        self._charts = charts.Charts(self._server, panel.add_tab("Last seconds"))
+        self._scene = scene.Scene(self._server, panel.add_tab("Last seconds"))
         panel.dock_right()
         panel.set_width(390)
-        self._scene = scene.Scene(self._server)
         self._server.on_client_connect(_adapt_resolution)
         self.frames = 0
         self._stopped = False
@@ -83,7 +82,7 @@ class Viewer:
         """Simulate and show until the time is over, ``stop`` or Ctrl-C."""
         begun = last = next_at = time.monotonic()
         while last - begun < seconds and not self._stopped:
-            self._notify(self._queue.run())
+            self._notify(self._inputs.run())
             now = time.monotonic()
             self._source.advance(self.clock.due(now - last))
             last = now
@@ -93,14 +92,12 @@ class Viewer:
 
     def render(self) -> None:
         """Show what is now; plots and text every few frames."""
-        source = self._source
-        self._scene.show(source.tracks, source.now)
-        turn = self.frames % _SLOW
-        self._charts.show(source.tracks, source.now, turn)
+        source, turn = self._source, self.frames % _SLOW
+        self._scene.show(source.tracks, source.now, turn)
         if turn == _SLOW - 1:
-            self._scene.mark(source.now)
             self._status.content = self._text()
-            self._uncover_legs()
+            for client in self._server.get_clients().values():  # it may cover a leg at any time
+                _send(client, _messages.RemoveNotificationMessage(_SLOW_BROWSER))
             if self._replay_panel is not None:
                 self._replay_panel.show()
             self._notify(source.notices)
@@ -121,26 +118,19 @@ class Viewer:
             for client in self._server.get_clients().values():
                 client.add_notification("Hopping leg", sentence, auto_close_seconds=_NOTICE_SECONDS)
 
-    def _uncover_legs(self) -> None:
-        """Take away viser's notice of a slow browser, which pages may show at any time."""
-        for client in self._server.get_clients().values():
-            _send(client, _messages.RemoveNotificationMessage(_SLOW_BROWSER))
-
     def _text(self) -> str:
         """Return what the page says: one line per leg, and the time."""
         source, lines = self._source, []
-        for track, colour in zip(source.tracks, scene.track_colours(source.tracks), strict=True):
-            height = track.last_apex(source.now)
-            apex = "none yet" if math.isnan(height) else f"{height:.3f} m"
-            lines.append(
-                f'<b style="color:{colour}">'
-                f'{html.escape(track.name)}</b>: last apex <span class="apex">{apex}</span>'
-            )
-            if track.note:
-                lines.append(html.escape(track.note))
         if isinstance(source, live_leg.LiveSimulation):
-            lines.insert(0, f'Commanded: <b><span id="command">{source.height:.3f}</span> m</b>')
-        lines.append(f'<span style="color:#77767b">{source.now:.2f} s</span>')
+            lines += [f'Commanded: <b><span id="command">{source.height:.3f}</span> m</b>']
+        for track, colour in zip(source.tracks, scene.track_colours(source.tracks), strict=True):
+            height, name = track.last_apex(source.now), html.escape(track.name)
+            apex = "none yet" if math.isnan(height) else f"{height:.3f} m"
+            lines += [
+                f'<b style="color:{colour}">{name}</b>: last apex <span class="apex">{apex}</span>'
+            ]
+            lines += [html.escape(track.note)] if track.note else []
+        lines += [f'<span style="color:#77767b">{source.now:.2f} s</span>']
         return f'<div style="padding:0.4em 1em;line-height:1.5">{"<br>".join(lines)}</div>'
 
 

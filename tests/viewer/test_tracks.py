@@ -8,31 +8,51 @@ from hopping_leg.deploy.loop import columns
 from hopping_leg.errors import RobotError, TraceError, UsageError
 from hopping_leg.robot import kinematics, load_robot
 from hopping_leg.trace import Trace
-from hopping_leg.viewer.data_source import RecorderSource, ReplaySource
-from hopping_leg.viewer.tracks import FIELDS, Track
+from hopping_leg.viewer.tracks import FIELDS, RecorderSource, ReplaySource, Track
 
 ROBOT = load_robot("legv2-paper")
 COLUMNS = ("time_s", "command_m", "hip_position_rad", "knee_position_rad", "hip_torque_nm")
 
 
 def box(path, robot="legv2"):
-    return FlightRecorder(path, COLUMNS, {"robot": robot, "controller": "fast"})
+    """A recorder whose rows are on disk at once."""
+    facts = {"robot": robot, "controller": "fast"}
+    return FlightRecorder(path, COLUMNS, facts, threaded=False)
 
 
 def write(writer, first, count, hip=0.8):
-    """Write ticks and wait until they are on disk."""
     for tick in range(first, first + count):
         writer.row((tick / 200, 0.3, hip, -1.6, 1.5))
-    writer._queue.put(None)
-    writer._thread.join()
-    writer._thread = type(writer._thread)(target=writer._write, daemon=True)
-    writer._thread.start()
 
 
 def finished(path, count, **header):
     writer = box(path, **header)
     write(writer, 0, count)
     writer.close()
+    return path
+
+
+def test_a_growing_file_cut_at_any_byte_is_followed_without_error_or_false_row(tmp_path):
+    whole = box(tmp_path / "whole")
+    write(whole, 0, 8)
+    whole.event(what="a transition")
+    write(whole, 8, 8, hip=0.9)
+    whole.close()
+    growing = tmp_path / f"growing{SUFFIX}"
+    growing.touch()
+    follow, seen = RecorderSource(growing), []
+    with growing.open("ab", buffering=0) as file:
+        for byte in whole.path.read_bytes():
+            file.write(bytes([byte]))
+            follow.advance(1 / 60)
+            seen.append(len(follow.tracks[0]) if follow.tracks else 0)
+    (track,) = follow.tracks
+    assert track.name == "fast"
+    assert np.unique(seen).tolist() == list(range(17)), "every row appears once it is whole"
+    assert seen == sorted(seen)
+    np.testing.assert_array_equal(track.time, np.arange(16) / 200)
+    np.testing.assert_array_equal(track.field("hip_position_rad"), np.repeat([0.8, 0.9], 8))
+    np.testing.assert_array_equal(track.field("knee_position_rad"), -1.6)
 
 
 def test_a_run_is_shown_as_it_grows_until_it_is_over(tmp_path):
@@ -99,10 +119,9 @@ def test_what_cannot_be_followed_is_refused(tmp_path):
     foreign.write_bytes(b"something else altogether")
     with pytest.raises(TraceError, match="no flight recording"):
         RecorderSource(foreign).advance(1.0)
-    unknown = tmp_path / f"unknown{SUFFIX}"
-    finished(unknown, 1, robot="mine")
+    unknown = RecorderSource(finished(tmp_path / f"unknown{SUFFIX}", 1, robot="mine"))
     with pytest.raises(RobotError, match="--robot"):
-        RecorderSource(unknown).advance(1.0)
+        unknown.advance(1.0)
 
 
 def stored(path, seconds=1.0, start=0.0, **header):
@@ -156,13 +175,12 @@ def rows(count, **given):
 
 
 def test_a_bounded_track_keeps_its_newest_rows_in_order():
-    track, unbounded = Track("x", ROBOT, depth=10), Track("x", ROBOT)
-    for tick in range(37):
-        for one in (track, unbounded):
-            one.extend(np.array([tick / 200]), rows(1, height_m=float(tick)))
-    np.testing.assert_allclose(track.time, np.arange(27, 37) / 200)
-    np.testing.assert_array_equal(track.field("height_m"), np.arange(27, 37))
-    np.testing.assert_array_equal(unbounded.field("height_m"), np.arange(37))
+    for depth, first in ((10, 27), (0, 0)):
+        track = Track("x", ROBOT, depth=depth)
+        for tick in range(37):
+            track.extend(np.array([tick / 200]), rows(1, height_m=float(tick)))
+        np.testing.assert_allclose(track.time, np.arange(first, 37) / 200)
+        np.testing.assert_array_equal(track.field("height_m"), np.arange(first, 37))
 
 
 def test_a_moment_lies_between_its_rows_and_samples_outside_of_them_are_unknown():
