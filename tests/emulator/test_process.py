@@ -166,7 +166,7 @@ def test_time_passes_on_the_wire():
 def test_a_link_has_one_emulator(tmp_path):
     config = EmulatorConfig(link=tmp_path / "leg")
     with EmulatorProcess(config) as first:
-        with pytest.raises(UsageError, match="leg is in use by process"):
+        with pytest.raises(UsageError, match="leg is in use by another process"):
             EmulatorProcess(config)
         assert first.path.exists()
     with EmulatorProcess(config) as second:

@@ -106,8 +106,8 @@ class Fdcanusb(LineTransport):
     """
 
     def __init__(self, path: str, checksums: bool | None = None) -> None:
-        self._lock = locks.Lock(Path(path), path, HardwareError)
-        self._port = opened(self._lock, lambda: serial.Serial(path, _BAUD, timeout=0))
+        self._lock = locks.DeviceLock(Path(path), HardwareError)
+        self._port = opened(self._lock.close, lambda: serial.Serial(path, _BAUD, timeout=0))
         wanted = not _is_fdcanusb(path) if checksums is None else checksums
         super().__init__(self._port.fileno(), checksums=wanted)
 
@@ -117,12 +117,12 @@ class Fdcanusb(LineTransport):
         self._lock.close()
 
 
-def opened(lock: locks.Lock, make: Callable[[], Any]) -> Any:  # noqa: ANN401
-    """Return what is made; where that fails, give the lock back and raise ``HardwareError``."""
+def opened(give_back: Callable[[], None], make: Callable[[], Any]) -> Any:  # noqa: ANN401
+    """Return what is made; where that fails, give the lock back, raise ``HardwareError``."""
     try:
         return make()
     except Exception as error:  # serial ports and python-can raise many types
-        lock.close()
+        give_back()
         if isinstance(error, HardwareError):
             raise
         raise HardwareError(f"Cannot open the adapter: {error}.") from error

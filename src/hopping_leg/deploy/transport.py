@@ -73,7 +73,7 @@ class PythonCan:
         self.trouble = ""
         name = f"{interface}:{channel}"
         self._lock = locks.named_lock(f"host-{name}", name, HardwareError)
-        self._bus = opened(self._lock, lambda: open_bus(interface, channel))
+        self._bus = opened(self._lock.release, lambda: open_bus(interface, channel))
 
     def send(self, frames: Sequence[Frame]) -> None:
         """Send what the bus takes at once."""
@@ -99,7 +99,7 @@ class PythonCan:
     def close(self) -> None:
         """Leave the bus."""
         self._bus.shutdown()
-        self._lock.close()
+        self._lock.release()
 
 
 def open_bus(interface: str, channel: str) -> can.BusABC:

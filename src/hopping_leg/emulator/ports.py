@@ -156,7 +156,7 @@ class PtyPort(LinePort):
         """Take the terminal away for good."""
         super().close()
         if self._lock is not None:
-            self._lock.close()
+            self._lock.release()
 
 
 def _flipped(line: bytes, digits: int, flip: int) -> bytes:
