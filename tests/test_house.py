@@ -21,7 +21,7 @@ CEILINGS = {
     "src/hopping_leg/sim/**/*.py": (13, 2520),
     "src/hopping_leg/viewer/**/*.py": (6, 1240),
     "src/**/*.py": (194, 30600),
-    "tests/**/*.py": (145, 16650),
+    "tests/**/*.py": (144, 16540),
     "studies/**/*.py": (82, 8620),
     "docs/**/*.md": (22, 2530),
     "docs/live/*.js": (13, 1490),

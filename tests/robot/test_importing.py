@@ -1,5 +1,6 @@
 import dataclasses
 import time
+from xml.etree import ElementTree as Xml
 
 import numpy as np
 import pytest
@@ -19,7 +20,6 @@ from hopping_leg.robot.importing import imported_robot, read_values
 from hopping_leg.robot.planar_leg import Names, read_leg
 from hopping_leg.robot.robot_files import robot_from_tree
 from tests.doc_pages import ROOT
-from tests.robot import drawn_urdf
 from tests.robot.legs import SEEDS, random_robot, random_state
 
 EXAMPLE = (ROOT / "examples/leg.urdf").read_text()
@@ -72,15 +72,59 @@ def test_a_drawn_leg_comes_back_from_its_urdf(tmp_path_factory, seed):
     assert (other.rail, other.foot) == (robot.rail, robot.foot)
 
 
+def drawn_urdf(robot, rng):
+    """Return a URDF whose joints' signs and zeros, plane and offsets beside it are drawn."""
+    yaw, zeros = rng.uniform(-np.pi, np.pi), (rng.uniform(-2, 2), rng.uniform(-2.5, -0.2))
+    forward, normal = [np.cos(yaw), np.sin(yaw), 0], np.array([np.sin(yaw), -np.cos(yaw), 0])
+    angles = np.cumsum(zeros)[:, None]
+    along = np.cos(angles) * [0, 0, -1] + np.sin(angles) * forward
+    hip, knee, foot = rng.uniform(-0.1, 0.1, 3)[:, None] * normal
+    knee, foot = knee + robot.thigh.length * along[0], foot + robot.shank.length * along[1]
+    root = Xml.Element("robot", name="drawn")
+
+    def add(parent, tag, **values):
+        texts = {k: v if isinstance(v, str) else " ".join(map(repr, v)) for k, v in values.items()}
+        return Xml.SubElement(parent, tag, texts)
+
+    def add_link(name, mass, com, tensor):
+        inertial = add(add(root, "link", name=name), "inertial")
+        add(inertial, "origin", xyz=com.tolist())
+        add(inertial, "mass", value=[mass])
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = tensor.tolist()
+        add(inertial, "inertia", ixx=[xx], iyy=[yy], izz=[zz], ixy=[xy], ixz=[xz], iyz=[yz])
+
+    def add_joint(name, kind, parent, child, place, axis):
+        joint = add(root, "joint", name=name, type=kind)
+        add(joint, "parent", link=parent)
+        add(joint, "child", link=child)
+        add(joint, "origin", xyz=place.tolist())
+        add(joint, "axis", xyz=axis.tolist())
+        return joint
+
+    for name in ("stand", "toe"):
+        add(root, "link", name=name)
+    add_link("base", robot.base.mass, hip, np.eye(3))
+    add_joint("slide", "prismatic", "stand", "base", np.zeros(3), np.eye(3)[2])
+    for k, (name, parent, place) in enumerate((("thigh", "base", hip), ("shank", "thigh", knee))):
+        link, joint, sign = getattr(robot, name), (robot.hip, robot.knee)[k], rng.choice([-1, 1])
+        ends = sorted(float(sign * (e - zeros[k])) for e in (joint.stop_lower, joint.stop_upper))
+        added = add_joint(f"{name}_joint", "revolute", parent, name, place, sign * normal)
+        add(added, "limit", lower=ends[:1], upper=ends[1:], effort="20", velocity="30")
+        add(added, "dynamics", friction=[joint.friction], damping=[joint.damping])
+        tensor = link.inertia * (np.eye(3) - 0.9 * np.outer(along[k], along[k]))
+        add_link(name, link.mass, link.com * along[k] + 0.03 * normal, tensor)
+    add_joint("end", "fixed", "shank", "toe", foot, np.eye(3)[0])
+    return Xml.tostring(root, encoding="unicode")
+
+
 @settings(max_examples=40, deadline=None)
 @given(SEEDS)
-def test_it_comes_back_whatever_frames_signs_and_zeros_a_file_has(tmp_path_factory, seed):
+def test_it_comes_back_whatever_signs_zeros_and_plane_a_file_has(tmp_path_factory, seed):
     rng = np.random.default_rng(seed)
     robot = random_robot(rng)
     knee = dataclasses.replace(robot.knee, stop_upper=0.0)  # else nobody knows where it bends
     robot = dataclasses.replace(robot, knee=knee)
-    text = drawn_urdf.urdf(robot, drawn_urdf.draw(rng))
-    other = imported(tmp_path_factory.mktemp("leg") / "leg.urdf", text)
+    other = imported(tmp_path_factory.mktemp("leg") / "leg.urdf", drawn_urdf(robot, rng))
     motors = {  # of the file nothing says it
         name: dataclasses.replace(getattr(robot, name), armature=getattr(other, name).armature)
         for name in ("hip", "knee")
@@ -176,7 +220,6 @@ def test_what_cannot_be_read_is_said_with_what_was_found(tmp_path, text, names, 
     "text",
     [
         "<robot>" + " " * (2 << 20) + "</robot>",
-        "<robot>" + "<link/>" * 60_000 + "</robot>",
         "<robot>" + "<a>" * 60_000 + "</a>" * 60_000 + "</robot>",
         "<mujoco><worldbody>" + "<body/>" * 20_000 + "</worldbody></mujoco>",
     ],
@@ -185,18 +228,6 @@ def test_a_file_that_no_leg_needs_is_refused_at_once(tmp_path, text):
     start = time.perf_counter()
     with pytest.raises(RobotError, match=r"more than|larger than"):
         imported(tmp_path / "leg.xml", text)
-    assert time.perf_counter() - start < 5
-
-
-def test_a_long_chain_is_searched_in_a_moment(tmp_path):
-    links = "".join(f'<link name="l{i}"/>' for i in range(901))
-    joints = "".join(
-        f'<joint name="j{i}" type="revolute"><parent link="l{i}"/><child link="l{i + 1}"/></joint>'
-        for i in range(900)
-    )
-    start = time.perf_counter()
-    with pytest.raises(RobotError, match="several pairs"):
-        imported(tmp_path / "leg.urdf", f"<robot>{links}{joints}</robot>")
     assert time.perf_counter() - start < 5
 
 

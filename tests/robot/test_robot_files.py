@@ -113,7 +113,6 @@ def test_every_mistake_gets_a_sentence_that_names_the_field(tmp_path, path, mist
         ("base = [", "not valid TOML"),
         ("base = 3", "'base': Expected"),
         ('extends = "legv2"\nkind = "log"', "Did you mean 'leg'"),
-        ('name = " "\nextends = "legv2"', "'name' is empty"),
         ("extends = 3", "'extends' must be"),
         ('extends = "legv3"', "Did you mean 'legv"),
         ('extends = "leg.toml"', "circle"),
@@ -131,15 +130,6 @@ def test_broken_files_get_a_sentence(tmp_path, content, sentence):
 def test_unknown_robots_are_told_the_valid_names(name):
     with pytest.raises(RobotError, match="legv2-paper"):
         load_robot(name)
-
-
-@pytest.mark.parametrize(("name", "value"), [("load_friction", 0.05), ("torque_gain", 0.9)])
-def test_what_a_drive_may_leave_out_changes_a_robot_only_where_it_is_stated(name, value):
-    robot = load_robot("legv2")
-    neutral = 0.0 if name == "load_friction" else 1.0
-    for stated, same in ((neutral, True), (value, False)):
-        hip = dataclasses.replace(robot.hip, **{name: stated})
-        assert (dataclasses.replace(robot, hip=hip).digest == robot.digest) == same
 
 
 def test_a_part_may_be_left_out_and_the_wiring_is_no_part_of_the_physics(tmp_path):
@@ -161,23 +151,17 @@ def test_a_part_may_be_left_out_and_the_wiring_is_no_part_of_the_physics(tmp_pat
         ("hip.lower", 3.0, "rad", "hip.upper"),
         ("knee.upper", 0.5, "rad", "knee.upper.*pendulum"),
         ("hip.upper", 68.0, "rad", "beyond the mechanical stop 'hip.stop_upper'"),
-        ("knee.stop_lower", -2.0, "rad", "'knee.lower'.*'knee.stop_lower'"),
         ("thigh.com", 0.4, "m", "thigh.length"),
         ("hip.motor.torque_limit", 40.0, "N m", "hip.motor.peak_torque"),
-        ("knee.motor.rated_torque", 17.0, "N m", "knee.motor.peak_torque"),
         ("contact.time_constant", 1e-4, "s", "contact.time_constant"),
         ("reality.knee.stiffness", 0.0, "N m/rad", "more than zero"),
         ("reality.knee.efficiency", 1.2, "1", "at most 1"),
-        ("reality.hip.stiction", 0.5, "1", "give 1 or more"),
         ("reality.hip.torque_limit", 99.0, "N m", "hip.motor.peak_torque"),
-        ("reality.ground.time_constant", 1e-4, "s", "two physics steps"),
         ("reality.latency.command", 0.01, "ms", "must be in 's'"),
         ("reality.latency.comand", 0.01, "s", "Did you mean 'command'"),
         ("hardware.knee.id", 1, "1", "both 1"),
         ("hardware.hip.id", 1.5, "1", "whole number"),
-        ("hardware.hip.sign", 0.5, "1", "1 or -1"),
         ("hardware.voltage_low", 50, "V", "voltage_high"),
-        ("hardware.watchdog", 0, "s", "more than zero"),
     ],
 )
 def test_numbers_that_cannot_be_name_the_fields(tmp_path, path, value, unit, sentence):
