@@ -135,6 +135,7 @@ def train(
         fitted = recipe.fit(robot)
         folder = run_folder.RunFolder(out, fitted, robot, seed, minutes, source)
         recipe, worst_score = stages.within_reach(fitted, robot)
+        run_folder.is_new(out, resume=resume)  # or refused, before a lock is put into it
         with locks.hold_folder(out, errors.UsageError):
             tree = folder.begin(resume=resume)
             legs = training_legs.find_legs(
