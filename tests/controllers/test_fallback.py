@@ -5,10 +5,10 @@ import pytest
 
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.fallback import Fallback, with_fallback
-from hopping_leg.controllers.policy import Card, Policy
+from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller, load_policy
 from hopping_leg.controllers.rollout import rollout
-from hopping_leg.errors import PolicyError, UsageError
+from hopping_leg.errors import UsageError
 from hopping_leg.hop_detection import measure_hops
 from hopping_leg.rl.onnx_export import with_card
 from hopping_leg.robot import load_robot
@@ -34,14 +34,6 @@ def measurement(q=(0.5, -1.2), qd=(0.0, 0.0)):
     return Measurement(
         np.tile(q, (1, 3, 1)), np.tile(qd, (1, 3, 1)), np.full((1, 3), 0.3), np.zeros((1, 3))
     )
-
-
-def test_a_card_keeps_the_range_of_inputs_and_refuses_one_that_is_none():
-    assert (ranged().card.input_low, ranged().card.input_high) == (LOW, HIGH)
-    for low, high in (((0.0,), (1.0,)), (LOW, ()), (HIGH, LOW)):
-        with pytest.raises(PolicyError, match="input_low"):
-            dataclasses.replace(FAST.card, input_low=low, input_high=high)
-    assert isinstance(FAST.card, Card)
 
 
 @pytest.mark.parametrize(

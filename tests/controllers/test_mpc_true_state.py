@@ -100,15 +100,6 @@ def test_commands_under_way_are_planned_with(latency):
     check_apexes(hop(robot, HEIGHTS[::3]), HEIGHTS[::3], most=0.003)
 
 
-def test_a_new_command_holds_for_the_next_push():
-    setup = RolloutConfig(ROBOT, timestep=STEP, threads=1)
-    commands = np.repeat([[0.25], [0.36], [0.28]], 400, axis=0)
-    found = hops_of(rollout(TrueStateMpc(ROBOT), setup, commands, seed=0), 0)
-    late = (found.tick % 400 > 200) & (found.tick > 200)
-    assert late.sum() >= 6
-    np.testing.assert_allclose(found.apex[late], commands[found.tick, 0][late], atol=0.005)
-
-
 SHAPE = np.rec.array([astuple(HopShape())], [(f.name, np.float64) for f in fields(HopShape)])[0]
 NUMBERS = ("flight", "squat", "liftoff", "stop")
 

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from hopping_leg.controllers import robot_numbers
 from hopping_leg.robot import Robot, load_robot
-from hopping_leg.sim.any_leg import draw_any_leg
 
 LEG = load_robot("legv2-identified")
 
@@ -55,12 +54,3 @@ def test_legs_of_one_shape_differ_in_length_and_mass_alone(longer, heavier):
     assert set(different) <= {0, 2}
     full = robot_numbers.full_torque(grown(LEG, longer, heavier)) / robot_numbers.full_torque(LEG)
     np.testing.assert_allclose(full, longer * heavier)
-
-
-def test_numbers_of_drawn_legs_are_about_one():
-    numbers = np.array([robot_numbers.robot_numbers(draw_any_leg(k).believed) for k in range(150)])
-    assert numbers.shape == (150, robot_numbers.COUNT)
-    assert np.abs(numbers.mean(axis=0)).max() < 1
-    assert (numbers.std(axis=0) < 1.6).all()
-    varies = np.delete(numbers, [21, 28], axis=1)
-    assert (varies.std(axis=0) > 0.2).all(), "all but the gains, which no file of a training tells"

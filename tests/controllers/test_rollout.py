@@ -85,9 +85,7 @@ def test_a_schedule_steps_and_stays():
     assert schedule.seconds == 7.5
 
 
-@pytest.mark.parametrize(
-    "text", ["", "0.3", "0.3:0", "0.3:-1", "a:b", "0.3:1,", "nan:1", "0.3:inf"]
-)
+@pytest.mark.parametrize("text", ["", "0.3", "0.3:0", "a:b", "nan:1", "0.3:inf"])
 def test_what_is_no_schedule_is_refused(text):
     with pytest.raises(UsageError, match="no step of a schedule"):
         CommandSchedule.parse(text)

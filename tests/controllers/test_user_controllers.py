@@ -7,7 +7,6 @@ import pytest
 
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.controllers.user_controllers import is_user_controller
 from hopping_leg.errors import ControllerError
 from hopping_leg.robot import load_robot
 from tests.controllers.measurements import hops_of, measurement
@@ -100,10 +99,7 @@ def test_single_legs_share_no_state_and_are_made_anew_by_reset(tmp_path):
     [
         (None, "np.zeros((self.count, 3))", r"finite torques.*\(3, 3\)"),
         (None, "np.full((self.count, 2), np.nan)", "finite torques.*nan"),
-        (None, "'much'", "ValueError"),
-        (None, "None", "finite torques"),
         (None, "1 / 0", r"ZeroDivisionError: division by zero \(mine.py, line 9\)"),
-        (ARGUMENTS, "[1.0]", "finite torques"),
         (ARGUMENTS, "[float('inf'), 0.0]", "finite torques"),
         ("a, b, c, d, e", "[0, 0]", "missing 1 required positional argument"),
     ],
@@ -126,15 +122,13 @@ def test_wrong_answers_are_stopped_by_name(tmp_path, arguments, answer, says):
         ("def make(robot, rate): return 3", "mine.py:make", "has the methods 'reset' and 'act'"),
         ("import nowhere", "mine.py:Leg", r"No module named 'nowhere' \(mine.py, line 1\)"),
         ("class Leg(", "mine.py:Leg", "could not be imported: SyntaxError"),
-        ("", "no_such.module:Leg", "No module named 'no_such'"),
     ],
 )
 def test_what_cannot_be_loaded_is_one_sentence(tmp_path, content, name, says):
     if content is not None:
         (tmp_path / "mine.py").write_text(content)
-    given = name if name.startswith("no_such") else str(tmp_path / name)
     with pytest.raises(ControllerError, match=says):
-        load_controller(given, ROBOT)
+        load_controller(tmp_path / name, ROBOT)
 
 
 def test_a_trace_keeps_its_own_columns(tmp_path):
@@ -151,8 +145,3 @@ def test_an_edited_file_is_another_controller(tmp_path):
     before, same = (load_controller(f"{path}:Held", ROBOT).digest for _ in range(2))
     written(path, BATCHED, answer="np.ones((self.count, 2))")
     assert before == same != load_controller(f"{path}:Held", ROBOT).digest
-
-
-def test_other_names_are_no_classes():
-    others = ("fast", "a/b.onnx", "my.toml", "energy-shaping", "a b:c")
-    assert not any(map(is_user_controller, others))

@@ -50,18 +50,6 @@ def test_legs_of_a_training_can_be_and_follow_from_their_seeds():
     assert np.abs(legs.qd).max() < 100
 
 
-def test_some_legs_of_a_training_are_worn_empty_or_noisy():
-    true = [leg.true for leg in DRAWN]
-    rare = {
-        "friction": [leg.knee.friction > 0.8 for leg in true],
-        "play": [leg.reality.knee.backlash > 0.01 for leg in true],
-        "battery": [leg.reality.voltage < 0.8 for leg in true],
-        "noise": [leg.reality.hip.sensor.position_noise > 0 for leg in true],
-    }
-    shares = {name: np.mean(found) for name, found in rare.items()}
-    assert all(0.02 < share < 0.3 for share in shares.values()), shares
-
-
 def test_what_is_told_leaves_out_gains_delay_and_transmission():
     told = [leg.believed for leg in DRAWN]
     assert all(robot.reality.neutral for robot in told)

@@ -73,16 +73,6 @@ def test_no_command_overtakes_another_nor_is_one_blended_in_what_is_measured(
         before = now.copy()
 
 
-def test_jitter_spreads_evenly_over_its_range():
-    legs = make_legs(late(0.002, 0.002), 2000)
-    legs.place(slice(None), 5.0, POSTURE)
-    means = [legs.step(np.full((2000, 2), 0.1 * (tick + 1)))[:, 0] for tick in range(3)]
-    share = (0.3 - means[2]) / 0.1  # of the 5 ms in which the command before still held
-    assert 0.4 <= share.min() < 0.41
-    assert 0.79 < share.max() <= 0.8
-    assert share.std() == pytest.approx(0.4 / np.sqrt(12), rel=0.05)
-
-
 @pytest.mark.parametrize("voltage", [1.0, 0.5])
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_the_torque_speed_line_holds_at_every_physics_step(voltage, sign):
@@ -159,14 +149,6 @@ def continuous(robot, command, duration):
 
     start = np.array([0.2, -0.4, 0.0, 0.0])
     return solve_ivp(rate, (0, duration), start, rtol=1e-10, atol=1e-12).y[:, -1]
-
-
-def test_damping_of_a_drive_is_no_inertia_where_its_torque_is_limited():
-    one, other = hanging(CAD), hanging(CAD)
-    for _ in range(10):
-        asked = drive_command(torque=[500.0, -500.0], damping=2.0)
-        np.testing.assert_array_equal(one.step_drives(asked), other.step(asked[:, :2]))
-    np.testing.assert_array_equal(one.state, other.state)
 
 
 def gained(torque, q=(0.0, 0.0), qd=(0.0, 0.0), **drive):

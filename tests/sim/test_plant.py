@@ -133,16 +133,6 @@ def test_delayed_samples_stay_in_order_and_carry_their_age(seed, count, depth):
         np.testing.assert_array_equal(seen.command, stamps)
 
 
-def test_half_of_all_ticks_are_delayed():
-    delayed = channel(64, QUIET)
-    late = []
-    for tick in range(200):
-        late.append(delayed.sense(*at(tick, 64)).age[:, 2] > 2.5 * PERIOD)
-        delayed.actuate(np.zeros((64, 2)))
-    # One of the 120 ways to draw three samples in order is the undelayed one.
-    assert np.mean(late) == pytest.approx(0.5 * 119 / 120, abs=0.015)
-
-
 def test_noise_fills_its_share_of_the_value_evenly():
     noise = NoiseAndDelay(delay_probability=0.0)
     noisy = channel(2000, noise)
@@ -166,16 +156,6 @@ def test_no_disturbance_passes_everything_unchanged():
         np.testing.assert_array_equal(seen.q[:, 0], q)
         np.testing.assert_array_equal(seen.age, np.tile([0, PERIOD, 2 * PERIOD], (3, 1)))
         np.testing.assert_array_equal(clean.actuate(qd), qd)
-
-
-def test_sensing_twice_in_a_tick_sees_the_same():
-    noisy = channel(4, NoiseAndDelay())
-    for tick in range(1200):
-        first = noisy.sense(*at(tick, 4))
-        again = noisy.sense(*at(tick, 4))
-        np.testing.assert_array_equal(first.q, again.q)
-        np.testing.assert_array_equal(first.age, again.age)
-        noisy.actuate(np.zeros((4, 2)))
 
 
 def test_a_restarted_leg_has_no_past():

@@ -148,25 +148,6 @@ def test_every_number_lies_in_its_range_and_fills_it():
         assert max(values) - min(values) >= 0.7 * (spread.high - spread.low)
 
 
-def test_a_twin_can_extend_a_users_file(tmp_path):
-    mine = tmp_path / "mine.toml"
-    mine.write_text('name = "mine"\nextends = "legv1"\n')
-    twin = draw_twin(3, str(mine))
-    twin.save(tmp_path / "elsewhere" / "twin.toml")
-    assert load_robot(tmp_path / "elsewhere" / "twin.toml").thigh.length == twin.robot.thigh.length
-    assert twin.robot.thigh.length == load_robot("legv1").thigh.length
-
-
-def test_drawn_twins_stand():
-    robots = [draw_twin(seed).robot for seed in range(12)]
-    legs = make_legs(LEG, 12, robots=robots)
-    legs.stand(slice(None), POSTURE)
-    for _ in range(20):
-        legs.step(10 * (POSTURE - legs.measured_q) - 0.2 * legs.measured_qd)
-    assert abs(legs.q - POSTURE).max() < 0.5
-    assert legs.height.min() > 0.1
-
-
 @pytest.mark.parametrize(("low", "high", "scale"), [(2, 1, "uniform"), (0, 1, "logarithmic")])
 def test_what_cannot_be_drawn_is_refused(low, high, scale):
     with pytest.raises(UsageError, match=r"hip\.friction"):

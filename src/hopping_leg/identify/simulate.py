@@ -16,7 +16,7 @@ from hopping_leg.errors import RecordingError, UsageError
 from hopping_leg.identify import initial_states, parameters, replay
 from hopping_leg.identify.recording import Recording
 from hopping_leg.robot import COARSE_TIMESTEP, Robot, kinematics
-from hopping_leg.sim.compiled import compiling_notice
+from hopping_leg.sim.compiled import announce
 from hopping_leg.sim.leg_table import LEG, leg_table
 
 _GAINS = ("stiffness", "damping", "integral")
@@ -81,8 +81,8 @@ def compile_replay() -> None:
     state, result = np.zeros((1, 1, 6)), np.zeros((1, 1, 1, replay.RESULT))
     table, drives = np.zeros((1, 1), LEG), np.zeros(1, replay.DRIVE)
     rows, spans = np.zeros(1, replay.ROW), np.zeros(1, replay.SPAN)
-    with compiling_notice(replay.replay):
-        replay.replay(table, drives, rows, spans, 0, COARSE_TIMESTEP, state, 0, 0, result)
+    announce(replay.replay)
+    replay.replay(table, drives, rows, spans, 0, COARSE_TIMESTEP, state, 0, 0, result)
 
 
 def _drive_values(hypotheses: Sequence[parameters.LegHypothesis], name: str) -> Array:

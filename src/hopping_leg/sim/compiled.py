@@ -10,9 +10,7 @@ import multiprocessing
 import os
 import sys
 import tempfile
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -35,26 +33,19 @@ def _cache_folder() -> str | None:
     digest = hashlib.sha256(f"{sys.version}{numba.__version__}".encode())
     for name in _SOURCES:
         digest.update((Path(__file__).parent / name).read_bytes())
-    for find in (_in_home, _in_temporary):
+    home = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    user = os.getuid() if hasattr(os, "getuid") else getpass.getuser()
+    for parent in (f"{home}/hopping-leg", f"{tempfile.gettempdir()}/hopping-leg-{user}"):
         try:
-            folder = find() / digest.hexdigest()[:16]
+            folder = Path(parent).expanduser() / digest.hexdigest()[:16]
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             # What another user left there must not be run.
-            own = not hasattr(os, "getuid") or folder.stat().st_uid == os.getuid()
-        except (OSError, RuntimeError, KeyError):
+            own = not hasattr(os, "getuid") or folder.stat().st_uid == user
+        except (OSError, RuntimeError):
             continue
         if own and os.access(folder, os.W_OK):
             return str(folder)
     return None
-
-
-def _in_home() -> Path:
-    home = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    return Path(home).expanduser() / "hopping-leg"
-
-
-def _in_temporary() -> Path:
-    return Path(tempfile.gettempdir()) / f"hopping-leg-{getpass.getuser()}"
 
 
 FOLDER = _cache_folder()
@@ -77,26 +68,10 @@ def inlined(function: Function) -> Function:
     return result
 
 
-@contextmanager
-def compiling_notice(*functions: Callable[..., Any]) -> Iterator[None]:
-    """Say on stderr, after a second, if one of the functions is being compiled rather than loaded.
-
-    It is said once. Workers say nothing: each of them would.
-    """
-    done = threading.Event()
-
-    def watch() -> None:
-        while not done.wait(1.0):
-            if any(one.stats.cache_misses for one in functions):  # type: ignore[attr-defined]
-                say_compiling()
-                return
-
-    if multiprocessing.parent_process() is None:
-        threading.Thread(target=watch, daemon=True).start()
-    try:
-        yield
-    finally:
-        done.set()
+def announce(*functions: Callable[..., Any]) -> None:
+    """Say on stderr, once, if a function has yet to be compiled. Workers say nothing."""
+    if multiprocessing.parent_process() is None and not all(map(was_compiled, functions)):
+        say_compiling()
 
 
 def was_compiled(function: Callable[..., Any]) -> bool:

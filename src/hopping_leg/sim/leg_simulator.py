@@ -13,7 +13,7 @@ from hopping_leg.arrays import Array, IntArray, Records
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import TIMESTEP, Robot
 from hopping_leg.sim import stepper
-from hopping_leg.sim.compiled import compiling_notice
+from hopping_leg.sim.compiled import announce
 from hopping_leg.sim.leg_table import LEG, leg_geometry, leg_table
 from hopping_leg.sim.simulator import CONTROL_RATE, Simulator
 
@@ -75,6 +75,8 @@ class LegSimulator(Simulator):
     def set_robots(self, robots: Sequence[Robot]) -> None:
         """Go on as other robots, one per leg, in the present state; commands stay under way.
 
+        Sensors that are later than any before have no past beyond the present.
+
         Raises:
             RobotError: A transmission cannot be simulated at this physics step.
             UsageError: Commands are late by too many control periods.
@@ -93,8 +95,10 @@ class LegSimulator(Simulator):
         self._jitters = bool(table["command_jitter"].any())
         self._noisy = bool(table["sensor_noise"].any())
         late = bool(table["measurement_latency"].any())
-        if late:
-            self._remember(2 + int(np.ceil(table["measurement_latency"].max() / self.timestep)))
+        depth = 2 + int(np.ceil(table["measurement_latency"].max() / self.timestep)) if late else 0
+        if depth > self._past.shape[1]:
+            self._past = np.repeat(self._true_reading()[:, None], depth, axis=1)
+            self._memory["newest"] = 0.0
         disturbed = late or self._noisy or table["sensor_step"].any() or table["elastic"].any()
         if disturbed and not self._disturbed:
             self._reading[:] = stepper.rounded(self._true_reading(), table["sensor_step"])
@@ -104,19 +108,6 @@ class LegSimulator(Simulator):
         """Return what undisturbed sensors would report, (n, 6)."""
         rotor = self._memory["rotor"] if self._disturbed else self.state[:, [1, 2, 4, 5]]
         return np.concatenate([rotor, self._memory["motor_torque"]], axis=1)
-
-    def _remember(self, depth: int) -> None:
-        """Remember that many physics steps, at least; what came before those known is unknown."""
-        known = self._past.shape[1]
-        if known >= depth:
-            return
-        if not known:
-            self._past = np.repeat(self._true_reading()[:, None], depth, axis=1)
-            return
-        ages = np.minimum(np.arange(depth)[::-1], known - 1)
-        slots = (self._memory["newest"].astype(np.int64)[:, None] - ages) % known
-        self._past = np.take_along_axis(self._past, slots[:, :, None], axis=1)
-        self._memory["newest"] = depth - 1
 
     @property
     def measured_q(self) -> Array:
@@ -238,9 +229,9 @@ def compile_physics() -> None:
     """
     table, memory = np.zeros(0, LEG), np.zeros(0, stepper.MEMORY)
     rows, values, past = np.zeros((0, 6)), np.zeros(0), np.zeros((0, 0, 6))
-    with compiling_notice(stepper.step_legs, stepper.read_sensors):
-        stepper.step_legs(table, rows, memory, past, rows, values, values, 0, 0, 1, TIMESTEP)
-        stepper.read_sensors(table, memory, past, rows, rows, TIMESTEP)
+    announce(stepper.step_legs, stepper.read_sensors)
+    stepper.step_legs(table, rows, memory, past, rows, values, values, 0, 0, 1, TIMESTEP)
+    stepper.read_sensors(table, memory, past, rows, rows, TIMESTEP)
 
 
 def thread_pool() -> ThreadPoolExecutor:
