@@ -60,8 +60,7 @@ def test_reset_forgets_everything_and_legs_do_not_depend_on_their_neighbours():
 )
 def test_gains_carry_over_to_other_legs_and_rates(robot, command, rate):
     leg = load_robot(robot)
-    length = 0.7 * (leg.thigh.length + leg.shank.length)
-    setup = RolloutConfig(leg, rate=rate, threads=1, start_length=length)
+    setup = RolloutConfig(leg, rate=rate, threads=1)
     window = measure(hop(tuned_energy_shaping(leg, rate=rate), setup, (command,)).trace(0))[0]
     assert len(window.apex) >= 4
     assert abs(np.median(window.error)) < 0.02

@@ -20,7 +20,8 @@ def measurements(ticks, count=4, seed=0, disturbance=LATE):
         q = np.tile([tick, -tick], (count, 1)).astype(float)
         if tick == 0:
             channel.restart(slice(None), q, q, np.full(count, 0.3))
-        yield tick, channel.sense(q, 10 * q, np.full(count, 0.3))
+        samples = channel.samples(q, 10 * q, np.full(count, 0.3))
+        yield tick, channel.measurement(samples)
         channel.actuate(np.zeros((count, 2)))
 
 
@@ -101,7 +102,7 @@ def errors(disturbance, gain, ticks=400, count=50, seed=3):
         q, qd = swing(tick * PERIOD, count)
         if tick == 0:
             channel.restart(slice(None), q, qd, np.zeros(count))
-        measurement = channel.sense(q, qd, np.zeros(count))
+        measurement = channel.measurement(channel.samples(q, qd, np.zeros(count)))
         estimate = observer.update(measurement)
         channel.actuate(np.zeros((count, 2)))
         if tick > 100:

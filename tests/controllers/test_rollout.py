@@ -7,9 +7,11 @@ import pytest
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.command_schedule import CommandSchedule, check_schedule, command_range
 from hopping_leg.controllers.registry import load_controller
+from hopping_leg.controllers.rollout import Perturbation
 from hopping_leg.errors import PhysicsError, UsageError
-from hopping_leg.robot import command_limits, load_robot
+from hopping_leg.robot import GRAVITY, command_limits, load_robot
 from hopping_leg.sim import NO_NOISE
+from tests.sim.legs import POSTURE, make_legs, without_friction
 
 ROBOT = load_robot("legv2")
 
@@ -62,7 +64,7 @@ def test_legs_of_any_size_start_standing(length):
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("rate", 0.0), ("rate", np.nan), ("timestep", -1.0), ("threads", -1), ("start_length", 0.5)],
+    [("rate", 0.0), ("rate", np.nan), ("timestep", -1.0), ("threads", -1)],
 )
 def test_meaningless_setups_are_refused(field, value):
     with pytest.raises(UsageError, match=field):
@@ -100,3 +102,32 @@ def test_a_policy_is_asked_for_what_it_was_trained_for_and_others_for_what_the_l
         with pytest.raises(UsageError, match="outside of what fast"):
             check_schedule(CommandSchedule(((height, 1.0),)), (low, high), "fast")
     assert command_range(load_controller("energy-shaping", LEG), LEG) == command_limits(LEG)
+
+
+def perturbation(legs, force=0.0, ground=0.0, ticks=40):
+    rows = np.ones((ticks, legs.count))
+    torque = np.zeros((ticks, legs.count, 2))
+    return Perturbation((legs.robot,) * legs.count, torque, force * rows, ground * rows)
+
+
+def test_a_push_changes_the_base_speed_by_impulse_over_mass():
+    legs, force = make_legs(without_friction(ROBOT), 1), 20.0
+    legs.place(slice(None), 2.0, np.zeros(2))
+    for tick in range(4):
+        perturbation(legs, force).act(legs, np.zeros(1), tick)
+        legs.step(np.zeros((1, 2)))
+    time = 4 * legs.period
+    assert legs.height_rate == pytest.approx((force / ROBOT.mass - GRAVITY) * time, rel=1e-6)
+
+
+@pytest.mark.parametrize("rise", [0.03, -0.03])
+def test_ground_steps_shift_floor_and_clearance_once_the_foot_is_clear(rise):
+    legs = make_legs(ROBOT, 2)
+    legs.stand(slice(None), POSTURE, np.array([0.05, 0.0]))
+    height, clearance = legs.height.copy(), legs.foot_clearance()
+    plan, ground = perturbation(legs, ground=rise), np.zeros(2)
+    for tick in range(2):
+        ground = plan.act(legs, ground, tick)
+        np.testing.assert_allclose(ground, [rise, 0.0])
+        np.testing.assert_allclose(legs.height, height - ground)
+        np.testing.assert_allclose(legs.foot_clearance(), clearance - ground, atol=1e-12)

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.io import replace_at
 from hopping_leg.robot import (
-    GRAVITY,
     DriveMismatch,
     GroundMismatch,
     Latency,
@@ -20,7 +19,6 @@ from hopping_leg.robot import (
     load_robot,
 )
 from hopping_leg.sim import LegSimulator
-from hopping_leg.sim.perturbation import Perturbation, Perturber
 from hopping_leg.sim.randomization import draw_twin
 from tests.sim.legs import (
     POSTURE,
@@ -289,42 +287,3 @@ def test_what_cannot_be_is_refused():
         make_legs(with_reality(knee=DriveMismatch(stiffness=1e6)))
     with pytest.raises(RobotError, match=r"reality.hip' has a backlash .* 'stiffness'"):
         make_legs(with_reality(hip=DriveMismatch(backlash=0.01)))
-
-
-def perturbed(legs, force=0.0, ground=0.0, ticks=40):
-    count = legs.count
-    plan = Perturbation(
-        (legs.robot,) * count,
-        np.zeros((ticks, count, 2)),
-        np.full((ticks, count), force),
-        np.full((ticks, count), ground),
-    )
-    return Perturber(plan, legs)
-
-
-def test_a_push_changes_the_base_speed_by_impulse_over_mass():
-    legs, force = make_legs(without_friction(CAD), 1), 20.0
-    legs.place(slice(None), 2.0, np.zeros(2))
-    perturber = perturbed(legs, force)
-    for tick in range(4):
-        perturber.act(tick)
-        legs.step(np.zeros((1, 2)))
-    time = 4 * legs.period
-    assert legs.height_rate == pytest.approx((force / CAD.mass - GRAVITY) * time, rel=1e-6)
-
-
-@pytest.mark.parametrize("rise", [0.03, -0.03])
-def test_ground_steps_shift_floor_and_clearance_once_the_foot_is_clear(rise):
-    legs = make_legs(CAD, 2)
-    legs.stand(slice(None), POSTURE, np.array([0.05, 0.0]))
-    height, clearance = legs.height.copy(), legs.foot_clearance()
-    perturber = perturbed(legs, ground=rise)
-    perturber.act(0)
-    np.testing.assert_allclose(perturber.ground, [rise, 0.0])
-    np.testing.assert_allclose(legs.foot_clearance(), clearance - perturber.ground, atol=1e-12)
-    perturber.act(1)
-    np.testing.assert_allclose(legs.height, height - [rise, 0.0])
-    for tick in range(2, 40):
-        perturber.act(tick)
-        legs.step(np.zeros((2, 2)))
-    assert legs.height[0] < height[0]

@@ -110,6 +110,11 @@ def channel(count, disturbance, seed=0):
     return Channel(count, disturbance, PERIOD, np.random.default_rng(seed))
 
 
+def seen_by(one, q, qd, command):
+    """Return what a channel shows of a true state."""
+    return one.measurement(one.samples(q, qd, command))
+
+
 def at(tick, count):
     """A true state and command that spell the tick."""
     value = float(tick)
@@ -121,7 +126,7 @@ def test_delayed_samples_stay_in_order_and_carry_their_age(seed, count, depth):
     delayed = channel(count, dataclasses.replace(QUIET, delay_buffer=depth), seed)
     delayed.restart(slice(None), *at(0, count))
     for tick in range(1, 40):
-        seen = delayed.sense(*at(tick, count))
+        seen = seen_by(delayed, *at(tick, count))
         delayed.actuate(np.zeros((count, 2)))
         ages = np.round(seen.age / PERIOD).astype(int)
         assert (np.diff(ages, axis=1) > 0).all()
@@ -137,7 +142,7 @@ def test_noise_fills_its_share_of_the_value_evenly():
     noise = NoiseAndDelay(delay_probability=0.0)
     noisy = channel(2000, noise)
     q, qd, asked = np.random.default_rng(1).normal(0, 5, (3, 2000, 2))
-    seen = noisy.sense(q, qd, np.full(2000, 0.3))
+    seen = seen_by(noisy, q, qd, np.full(2000, 0.3))
     shares = {"joint_noise": (seen.q[:, 0] / q - 1, seen.qd[:, 0] / qd - 1)}
     shares["torque_noise"] = (noisy.actuate(asked) / asked - 1,)
     for name, found in shares.items():
@@ -152,7 +157,7 @@ def test_no_disturbance_passes_everything_unchanged():
     clean = channel(3, NO_NOISE)
     for tick in range(30):
         q, qd, command = at(tick, 3)
-        seen = clean.sense(q, qd, command)
+        seen = seen_by(clean, q, qd, command)
         np.testing.assert_array_equal(seen.q[:, 0], q)
         np.testing.assert_array_equal(seen.age, np.tile([0, PERIOD, 2 * PERIOD], (3, 1)))
         np.testing.assert_array_equal(clean.actuate(qd), qd)
@@ -161,10 +166,10 @@ def test_no_disturbance_passes_everything_unchanged():
 def test_a_restarted_leg_has_no_past():
     noisy = channel(2, QUIET)
     for tick in range(25):
-        noisy.sense(*at(tick, 2))
+        seen_by(noisy, *at(tick, 2))
         noisy.actuate(np.zeros((2, 2)))
     noisy.restart(np.array([1]), *at(100, 1))
-    seen = noisy.sense(*at(100, 2))
+    seen = seen_by(noisy, *at(100, 2))
     assert (seen.q[1] == 100).all()
     assert (seen.q[0, 1:] < 100).all()
 
@@ -173,11 +178,11 @@ def test_a_restarted_leg_has_no_past():
 def test_a_restored_channel_goes_on_exactly(ticks):
     one, other = channel(1, NoiseAndDelay(), 1), channel(1, NoiseAndDelay(), 2)
     for tick in range(ticks):
-        one.sense(*at(tick, 1))
+        seen_by(one, *at(tick, 1))
         one.actuate(np.ones((1, 2)))
     other.restore(one.state())
     for tick in range(ticks, ticks + 600):
-        np.testing.assert_array_equal(one.sense(*at(tick, 1)).q, other.sense(*at(tick, 1)).q)
+        np.testing.assert_array_equal(seen_by(one, *at(tick, 1)).q, seen_by(other, *at(tick, 1)).q)
         ones = np.ones((1, 2))
         np.testing.assert_array_equal(one.actuate(ones), other.actuate(ones))
 

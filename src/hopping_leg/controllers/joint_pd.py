@@ -79,10 +79,9 @@ class JointPD:
 
     def internals(self) -> dict[str, Array]:
         """Return the targets of the last ``act``, each (n,)."""
-        tick = max(self._tick, 0)
         targets = {"position_command_rad": self.position, "velocity_command_rad_s": self.velocity}
         return {
-            f"{joint}_{kind}": np.full(self._count, rows[tick, column])
+            f"{joint}_{kind}": np.full(self._count, rows[max(self._tick, 0), column])
             for kind, rows in targets.items()
             for column, joint in enumerate(JOINTS)
         }

@@ -40,8 +40,8 @@ class ObservationHistory(ABC):
 
     @property
     def network_inputs(self) -> tuple[str, ...]:
-        """Graph inputs that the network sees; others scale what it gives."""
-        return tuple(self.shapes)
+        """Graph inputs that the network sees; the full torque scales what it gives."""
+        return tuple(name for name in self.shapes if name != FULL_TORQUE)
 
     def set_robots(self, robots: Sequence[Robot]) -> None:  # noqa: B027
         """Say what is believed of the legs: a robot each, or one of all."""
@@ -230,11 +230,6 @@ class AnyLeg(Dated):
         FULL_TORQUE: (2,),
     }
 
-    @property
-    def network_inputs(self) -> tuple[str, ...]:
-        """All but the full torque."""
-        return tuple(name for name in self.shapes if name != FULL_TORQUE)
-
     _numbers: Array | None = None
 
     def set_robots(self, robots: Sequence[Robot]) -> None:
@@ -280,9 +275,8 @@ class AnyLeg(Dated):
         thigh, shank = self._share * thigh, (1 - self._share) * shank
         rate = qd.sum(axis=-1)[..., None]
         turned = qd[..., :1] * thigh[..., ::-1] + rate * shank[..., ::-1]
-        return self.FOOT_GAIN * (
-            thigh + shank - self.FOOT_MIDDLE
-        ), self.VELOCITY_GAIN * _TURN * turned
+        foot = self.FOOT_GAIN * (thigh + shank - self.FOOT_MIDDLE)
+        return foot, self.VELOCITY_GAIN * _TURN * turned
 
 
 _TURN = np.array([-1.0, 1.0])

@@ -10,6 +10,7 @@ import polars as pl
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.errors import PhysicsError, UsageError
+from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.robot import TIMESTEP, Robot, SoftLimits, kinematics
 from hopping_leg.sim import (
     CONTROL_RATE,
@@ -19,7 +20,6 @@ from hopping_leg.sim import (
     Plant,
     Simulator,
 )
-from hopping_leg.sim.perturbation import Perturbation, Perturber
 from hopping_leg.trace import COLUMNS, Trace
 
 _START_SHARE = 0.2 / 0.29  # leg length of the standing start as a share of the straight leg's
@@ -40,9 +40,6 @@ class RolloutConfig:
     """Control rate, Hz."""
     timestep: float = TIMESTEP
     """Physics step, s."""
-    start_length: float | None = None
-    """Leg length of the standing start, m, hip axis to the foot's centre, foot below the hip; none
-    takes the paper leg's 0.2 m, scaled to the links."""
     threads: int = 0
     """Worker threads, 0 for one per core."""
 
@@ -54,10 +51,6 @@ class RolloutConfig:
                 raise UsageError(f"'{name}' is {value:g} but must be positive and finite.")
         if self.threads < 0:
             raise UsageError(f"'threads' is {self.threads} but must be 0 (all cores) or more.")
-        if np.isnan(self.start_posture).any():
-            raise UsageError(
-                f"'start_length' is {self.start_length} m, out of reach of {self.robot.name}."
-            )
 
     @property
     def start_posture(self) -> Array:
@@ -66,10 +59,32 @@ class RolloutConfig:
 
     @property
     def standing_length(self) -> float:
-        """Leg length of the standing start, m."""
-        if self.start_length is not None:
-            return self.start_length
+        """Length from hip to foot at the standing start, m: the paper leg's 0.2 m, scaled."""
         return _START_SHARE * (self.robot.thigh.length + self.robot.shank.length)
+
+
+@dataclass(frozen=True)
+class Perturbation:
+    """What happens to n legs in a run, unknown to their controller and fixed before it begins."""
+
+    robots: tuple[Robot, ...]
+    """What each leg is, whatever its controller believes, n of them."""
+    torque: Array
+    """Added to the torques asked for, N m, (ticks, n, 2)."""
+    force: Array
+    """Upward push on the base, N, (ticks, n)."""
+    ground: Array
+    """Where the ground is to be, m above where it was, (ticks, n); it moves under a leg as soon as
+    the foot is clear of it."""
+
+    def act(self, legs: LegSimulator, ground: Array, tick: int) -> Array:
+        """Push legs and move their ground, which is at ``ground``, (n,); return where it is now."""
+        legs.push(self.force[tick])
+        rise = self.ground[tick] - ground
+        room = legs.foot_clearance() >= FLIGHT_CLEARANCE + np.maximum(rise, 0)
+        rise = np.where(room, rise, 0.0)
+        legs.raise_ground(rise)
+        return ground + rise
 
 
 @runtime_checkable
@@ -129,13 +144,11 @@ def rollout(
         PhysicsError: The simulation became unstable.
     """
     ticks, count = commands.shape
-    perturber = None
     if legs is None:
-        legs = made = LegSimulator(
+        legs = LegSimulator(
             config.robot, count, rate=config.rate, timestep=config.timestep,
             threads=config.threads, robots=() if perturbation is None else perturbation.robots,
         )  # fmt: skip
-        perturber = None if perturbation is None else Perturber(perturbation, made)
     plant = Plant(legs, config.disturbance, config.soft_limits, np.random.default_rng(seed))
     legs.stand(slice(None), config.start_posture)
     plant.channel.restart(slice(None), legs.q, legs.qd, commands[0])
@@ -143,10 +156,10 @@ def rollout(
     if isinstance(controller, PrivilegedController):
         controller.watch(legs)
     data = np.empty((len(_COLUMNS), ticks, count))
-    internals: dict[str, Array] = {}
+    internals, ground = dict[str, Array](), np.zeros(count)
     for tick in range(ticks):
-        if perturber is not None:
-            perturber.act(tick)
+        if perturbation is not None and isinstance(legs, LegSimulator):
+            ground = perturbation.act(legs, ground, tick)
         _record_state(data[:, tick], legs, commands[tick])
         torque = controller.act(plant.sense(commands[tick]))
         for name, values in controller.internals().items():

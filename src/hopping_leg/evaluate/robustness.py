@@ -16,12 +16,12 @@ from scipy.stats import qmc
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
+from hopping_leg.controllers.rollout import Perturbation
 from hopping_leg.evaluate import metrics, runner, statistics, trials
 from hopping_leg.evaluate.entries import Entry, check_entries, fingerprint
 from hopping_leg.evaluate.result import ResultCache
 from hopping_leg.evaluate.robustness_axes import AXES, NOMINAL, Axis, Case, axes_named
 from hopping_leg.io import safe_file_name
-from hopping_leg.sim.perturbation import Perturbation
 
 SCHEMA = 2
 """Version of the JSON, raised when a name changes its meaning."""

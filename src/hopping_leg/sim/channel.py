@@ -75,10 +75,10 @@ class Measurement:
 class Channel:
     """Between the legs and their controller: noise on both ways, delay on the way in.
 
-    Every tick calls ``sense``, then ``actuate`` once. Noisy samples enter a buffer of the last ten
-    ticks; with probability 0.5 three of them, in order of time, replace the latest three. Sensing
-    again within a tick gives the same noise. ``period`` is the control period, s. Legs that are not
-    ``disturbed``, (n,), have no noise and no delay.
+    Every tick calls ``samples``, then ``actuate`` once. Noisy samples enter a buffer of the last
+    ten ticks; with probability 0.5 three of them, in order of time, replace the latest three.
+    ``period`` is the control period, s. Legs that are not ``disturbed``, (n,), have no noise and no
+    delay.
     """
 
     def __init__(
@@ -116,16 +116,12 @@ class Channel:
         self._buffer[:, ids, 2:4] = qd
         self._buffer[:, ids, 4] = command
 
-    def sense(self, q: Array, qd: Array, command: Array) -> Measurement:
-        """Return what the controllers see of the true state; again in a tick, the same noise.
+    def samples(self, q: Array, qd: Array, command: Array) -> Array:
+        """Return what is seen of the true state as (q1, q2, qd1, qd2, command), (n, 3, 5).
 
         Shapes are (n, 2) for ``q``, rad, and ``qd``, rad/s, and (n,) for the heights ``command``,
-        m.
+        m. Again in a tick, the noise is the same.
         """
-        return self.measurement(self.samples(q, qd, command))
-
-    def samples(self, q: Array, qd: Array, command: Array) -> Array:
-        """Return the same as ``sense`` in one array of (q1, q2, qd1, qd2, command), (n, 3, 5)."""
         positions, velocities, commands = self._parts[self._tick % len(self._parts)]
         positions[:], velocities[:], commands[:] = q, qd, command
         samples, disturbance = np.empty((self.count, SAMPLES, 5)), self.disturbance
