@@ -24,7 +24,7 @@ def browser():
     """A browser without a screen."""
     pytest.importorskip("viser", reason="the extra 'view' is not installed")
     pytest.importorskip("playwright", reason="playwright is not installed")
-    from studies.speed.browser import chromium, find_chromium
+    from tests.browser import chromium, find_chromium
 
     if find_chromium() is None:
         pytest.skip("there is no Chromium on this computer")
@@ -42,7 +42,7 @@ _ENDED = "ERR_ABORTED"
 @pytest.fixture
 def page(browser):
     """An empty page; in the end nothing may have been complained of or loaded from afar."""
-    from studies.speed.browser import new_page
+    from tests.browser import new_page
 
     complaints, far = [], []
     page = new_page(browser)
@@ -61,7 +61,7 @@ def page(browser):
 @pytest.fixture
 def foreign(browser, tmp_path):
     """A page of another site, served by this computer so that the browser alone forbids nothing."""
-    from studies.speed.browser import new_page
+    from tests.browser import new_page
 
     (tmp_path / "index.html").write_text("<p>")
     serve = functools.partial(http.server.SimpleHTTPRequestHandler, directory=tmp_path)

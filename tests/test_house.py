@@ -21,9 +21,9 @@ CEILINGS = {
     "src/hopping_leg/sim/**/*.py": (12, 2430),
     "src/hopping_leg/viewer/**/*.py": (6, 1240),
     "src/**/*.py": (193, 30520),
-    "tests/**/*.py": (144, 16330),
-    "studies/**/*.py": (82, 8620),
-    "docs/**/*.md": (22, 2530),
+    "tests/**/*.py": (145, 16420),
+    "studies/**/*.py": (79, 8270),
+    "docs/**/*.md": (22, 2520),
     "docs/live/*.js": (13, 1490),
 }
 """Files and lines at most. Who raises one says what users gain by it."""

@@ -4,18 +4,13 @@ import numpy as np
 import polars as pl
 import pytest
 
-pytest.importorskip("viser", reason="the extra 'view' is not installed")
-
-from hopping_leg.controllers.registry import shipped_policies
 from hopping_leg.deploy.motion_sequence import Part
 from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
 from hopping_leg.robot import load_robot
 from hopping_leg.trace import Trace
 from studies.shared import interleave, main
-from studies.speed.browser import find_chromium
 from studies.speed.deploy import Deploy, settled_apexes
 from studies.speed.env import Env, record
-from studies.speed.inference import Inference
 
 ROBOT = load_robot("legv2-paper")
 
@@ -59,13 +54,6 @@ def test_every_promised_number_of_the_environment_is_there(tmp_path):
     assert {"batched_env_overhead_s", "host", "command"} <= result.keys()
 
 
-def test_every_shipped_policy_is_timed(tmp_path):
-    result = measured(tmp_path, Inference, "--calls", "10")
-    assert [row["policy"] for row in result["rows"]] == shipped_policies()
-    for row in result["rows"]:
-        assert 0 < row["inference_median_us"] <= row["inference_p99_us"]
-
-
 def test_apexes_count_while_the_leg_hops_and_has_settled():
     time = np.arange(0, 12, 0.005)
     part = np.where(time < 1, Part.RISE, np.where(time < 11, Part.HOP, Part.SINK))
@@ -89,20 +77,3 @@ def test_the_leg_hops_through_the_wire_as_in_process(tmp_path):
         assert list(result[name]) == ["p50", "p99", "p99.9", "max"]
     for row in result["heights"]:
         assert abs(row["relative_difference"]) < 0.05
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(find_chromium() is None, reason="there is no Chromium here")
-def test_the_viewer_is_measured_through_the_real_page(tmp_path):
-    pytest.importorskip("playwright", reason="playwright is not installed")
-    from studies.speed.view import View
-
-    picture = tmp_path / "page.png"
-    words = ["--seconds", "2", "--commands", "3", "--picture", str(picture)]
-    result = measured(tmp_path, View, *words)
-    assert 0 < result["latency_ms"]["median"] <= result["latency_ms"]["most"]
-    for watched in (result, result["small_window"]):
-        assert 0 < watched["frames_per_s"] < 66
-    assert 0 < result["real_time"] < 1.1
-    assert result["start_s"] > 0
-    assert picture.stat().st_size < 150_000

@@ -10,7 +10,6 @@ import pytest
 pytest.importorskip("viser", reason="the extra 'view' is not installed")
 
 from PIL import Image
-from studies.speed.browser import PATIENCE, running, wait_for_leg
 
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.rollout import RolloutConfig, rollout
@@ -20,6 +19,7 @@ from hopping_leg.viewer.live_leg import LiveSimulation
 from hopping_leg.viewer.panels import HEIGHT_STEP, KEY_STEP
 from hopping_leg.viewer.tracks import RecorderSource, ReplaySource
 from hopping_leg.viewer.viewer import Viewer
+from tests.browser import PATIENCE, running, wait_for_leg
 
 pytestmark = pytest.mark.slow
 ROBOT = "legv2-paper"

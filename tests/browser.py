@@ -1,4 +1,4 @@
-"""A browser without a screen, driven from here: for the tests and the benchmark of the page."""
+"""A browser without a screen, driven from here: for the tests of the page."""
 
 import contextlib
 import shutil
