@@ -9,7 +9,8 @@ from hopping_leg.deploy.drive_link import JointTransform, joint_transforms
 from hopping_leg.deploy.preflight import DriveInfo, check_drives, require_fit, required_settings
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import HardwareError
-from hopping_leg.robot import REGISTER_MAP, Hardware, Servo, load_robot
+from hopping_leg.robot import REGISTER_MAP, Hardware, load_robot
+from hopping_leg.robot.hardware import Servo
 
 LEG = load_robot("legv2")
 LIMITS = hopping_limits(LEG, 200.0)

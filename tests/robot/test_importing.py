@@ -195,6 +195,7 @@ def test_what_is_given_goes_before_the_file_and_the_file_before_the_motor(tmp_pa
         ('<robot xmlns:xacro="x"><xacro:include/></robot>', Names(), "xacro"),
         (LEG.replace('"knee" type="revolute"', '"knee" type="fixed"'), Names(), "are: 'hip'."),
         (LEG.replace("0 -1 0", "0 0 1"), Names(), "is not level"),
+        (LEG.replace('xyz="0 0 -0.15"', 'xyz="0 0 0"'), Names(), "turn about one axis"),
         (LEG, Names(hip="hp"), "--hip: There is no hinge 'hp'. Did you mean 'hip'?"),
         (LEG, Names(foot="tip"), "--foot: There is no point below the knee 'tip'."),
         (LEG.replace('<child link="shank"', '<child link="shin"'), Names(), "MuJoCo reads"),

@@ -4,8 +4,9 @@ import dataclasses
 
 import numpy as np
 
-from hopping_leg.robot import DriveMismatch, ModelMismatch, load_robot
+from hopping_leg.robot import DriveMismatch, load_robot
 from hopping_leg.robot.dynamics import kinetic_energy, potential_energy
+from hopping_leg.robot.model_mismatch import ModelMismatch
 from hopping_leg.sim import LegSimulator
 
 POSTURE = np.array([0.7, -1.4])

@@ -115,17 +115,6 @@ def test_randomising_draws_nothing_from_the_task_itself():
     np.testing.assert_array_equal(heights(task(0, [fixed])), heights(task(0, [])))
 
 
-def test_a_critic_may_see_in_which_leg_it_is():
-    one, plain = task(0), task(0, [])
-    seen = one.privileged()
-    assert seen.shape == (5, one.privileged_size)
-    assert one.privileged_size == plain.privileged_size + len(IDENTIFIABLE_RANGES)
-    assert plain.privileged().shape == (5, plain.privileged_size)
-    numbers = seen[:, plain.privileged_size :]
-    assert (np.abs(numbers) <= 1).all()
-    assert len(np.unique(numbers, axis=0)) == 5
-
-
 @pytest.mark.parametrize("seed", [0, 1, 17])
 def test_a_twin_is_the_same_after_its_file(tmp_path, seed):
     twin, file = draw_twin(seed), tmp_path / "twin.toml"

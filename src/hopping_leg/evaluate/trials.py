@@ -11,7 +11,8 @@ from hopping_leg import errors, io
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.evaluate.metrics import stretches
-from hopping_leg.robot import Contact, GroundMismatch, Robot, command_limits
+from hopping_leg.robot import GroundMismatch, Robot, command_limits
+from hopping_leg.robot.parameters import Contact
 from hopping_leg.trace import Trace
 
 COMMANDS = (0.25, 0.30, 0.35)

@@ -1,6 +1,6 @@
 """What the leg is: parameters, geometry, kinematics and dynamics."""
 
-from hopping_leg.robot.hardware import REGISTER_MAP, Hardware, Servo
+from hopping_leg.robot.hardware import REGISTER_MAP, Hardware
 from hopping_leg.robot.limits import (
     OVERSPEED,
     MotorLimit,
@@ -23,11 +23,9 @@ from hopping_leg.robot.model_mismatch import (
     DriveMismatch,
     GroundMismatch,
     Latency,
-    MassScale,
-    ModelMismatch,
     SensorMismatch,
 )
-from hopping_leg.robot.parameters import JOINTS, Contact, Joint, Link, Robot
+from hopping_leg.robot.parameters import JOINTS, Joint, Link, Robot
 from hopping_leg.robot.robot_checks import check_physics, numbers
 from hopping_leg.robot.robot_files import (
     DEFAULT_ROBOT,
@@ -53,19 +51,15 @@ __all__ = [
     "REGISTER_MAP",
     "STANDING_NOISE",
     "TIMESTEP",
-    "Contact",
     "DriveMismatch",
     "GroundMismatch",
     "Hardware",
     "Joint",
     "Latency",
     "Link",
-    "MassScale",
-    "ModelMismatch",
     "MotorLimit",
     "Robot",
     "SensorMismatch",
-    "Servo",
     "SoftLimits",
     "braking_times",
     "build_model",

@@ -20,6 +20,7 @@ from hopping_leg.io import one_line
 
 _LARGEST_FILE = 1 << 20  # bytes
 _MOST_ELEMENTS = 5000
+_FARTHEST = 1e6  # m
 _NOTHING = 1e-12
 """Mass and inertia that stand for none, kg and kg m2: MuJoCo moves no body without them."""
 
@@ -68,6 +69,9 @@ class Description:
             raise RobotError(f"{path} is no model that MuJoCo reads: {why}.") from error
         self.data = mujoco.MjData(self.model)
         mujoco.mj_kinematics(self.model, self.data)
+        places = (self.data.xipos, self.data.geom_xpos, self.data.xaxis)
+        if not all(np.all(np.abs(place) < _FARTHEST) for place in places):
+            raise RobotError(f"{path}: its bodies lie farther away than any leg's; check its file.")
         strength = np.linalg.norm(self.model.opt.gravity)
         if not strength > 0:
             raise RobotError(f"{path} has no gravity, which says where down is.")

@@ -125,6 +125,11 @@ def _parts(tree: Description, names: Names) -> _Parts:
             f"{tree.origin}: the axis of '{tree.joint(hip)}' is not level, so that the leg leaves"
             " its vertical plane; turn the file's root, or name another --hip."
         )
+    if _aside(tree, hip, tree.data.xanchor[knee] - tree.data.xanchor[hip]) < _SAME_PLACE:
+        both = f"'{tree.joint(hip)}' and '{tree.joint(knee)}'"
+        raise RobotError(
+            f"{tree.origin}: {both} turn about one axis; name others, --hip or --knee."
+        )
     slides = tree.above(hip, _SLIDE)
     vertical = (i for i in slides if abs(tree.data.xaxis[i] @ tree.up) > 1 - _PARALLEL)
     rail = next(vertical, None)

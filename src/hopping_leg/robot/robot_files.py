@@ -181,20 +181,15 @@ def robot_tree(part: Any, source: str) -> Tree:  # noqa: ANN401
     """Return a robot as a file's tables that stand alone, without what is at its default."""
     tables: Tree = {}
     for spec in dataclasses.fields(part):
-        value = getattr(part, spec.name)
+        value, made = getattr(part, spec.name), spec.default_factory
         if dataclasses.is_dataclass(value):
-            if value != _default(spec):
+            if made is dataclasses.MISSING or value != made():
                 tables[spec.name] = robot_tree(value, source)
         elif value is not None and value != spec.default:
             unit = spec.metadata.get("unit")
             entry = {"value": value, "unit": unit, "source": source}
             tables[spec.name] = value if unit is None else entry
     return tables
-
-
-def _default(spec: dataclasses.Field[Any]) -> object:
-    made = spec.default_factory
-    return spec.default if made is dataclasses.MISSING else made()
 
 
 def robot_text(tree: Tree, comment: str = "") -> str:
