@@ -1,14 +1,12 @@
-"""How fine the physics must step, and what its other numbers are worth.
+"""How fine the physics must step.
 
 Single hops diverge after the first few whatever the step, since contact makes them chaotic. So what
 is compared are medians and standard deviations of many hops under the same noise.
 """
 
 import itertools
-from collections.abc import Callable
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 from rich.progress import track
 
@@ -18,8 +16,6 @@ from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import Robot, load_robot
-from hopping_leg.sim import Simulator
-from hopping_leg.sim.mujoco_simulator import MujocoSimulator
 from studies.shared import Row
 
 TOLERANCE = 0.5e-3
@@ -27,42 +23,6 @@ TOLERANCE = 0.5e-3
 
 SETTLING = 2.0
 """Beginning of every run that is left out, s."""
-
-_HARD = (0.99, 0.999, 1e-4, 0.5, 2.0)
-
-
-def _elliptic(spec: mujoco.MjSpec) -> None:
-    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-
-
-def _solver(spec: mujoco.MjSpec) -> None:
-    spec.option.solver = mujoco.mjtSolver.mjSOL_CG
-    spec.option.tolerance, spec.option.iterations = 1e-12, 500
-
-
-def _runge_kutta(spec: mujoco.MjSpec) -> None:
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
-
-
-def _hard_contact(spec: mujoco.MjSpec) -> None:
-    for geom in spec.geoms:
-        geom.solimp = _HARD
-
-
-def _soft_friction(spec: mujoco.MjSpec) -> None:
-    for joint in spec.joints:
-        joint.solref_friction, joint.solimp_friction = [0.02, 1.0], [0.9, 0.95, 1e-3, 0.5, 2.0]
-
-
-VARIANTS: dict[str, Callable[[mujoco.MjSpec], None] | None] = {
-    "as it is": None,
-    "elliptic cone": _elliptic,
-    "solver CG": _solver,
-    "integrator RK4": _runge_kutta,
-    "contact impedance 0.99": _hard_contact,
-    "MuJoCo's default friction": _soft_friction,
-}
-"""Changes of MuJoCo's numbers, one at a time."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +75,6 @@ class PhysicsStep:
             "converged_timestep_s": converged(rows),
             "converged": converge,
             "rows": rows,
-            "variants": self._variants(),
             "repeats": self.repeats,
             "duration_s": self.duration,
         }
@@ -123,14 +82,12 @@ class PhysicsStep:
         say(f"All of them: {_says(converged(rows))}.")
         return result
 
-    def _rows(
-        self, name: str, robot: Robot, step: float, legs: Simulator | None = None
-    ) -> list[Row]:
+    def _rows(self, name: str, robot: Robot, step: float) -> list[Row]:
         setup = RolloutConfig(robot, timestep=step, threads=self.threads)
         commands = np.repeat(self.commands, self.repeats)
         ticks = round(self.duration * setup.rate)
         controller = load_controller(name, robot)
-        run = rollout(controller, setup, np.tile(commands, (ticks, 1)), self.seed, legs=legs)
+        run = rollout(controller, setup, np.tile(commands, (ticks, 1)), self.seed)
         columns = (run.data[c].T for c in ("height_m", "height_rate_m_s", "foot_clearance_m"))
         apexes = []
         for leg in zip(*columns, strict=True):
@@ -154,25 +111,6 @@ class PhysicsStep:
                 row[f"{key}_standard_error"] = float(spread)
             rows.append(row)
         return rows
-
-    def _variants(self) -> list[Row]:
-        """Vary MuJoCo's other numbers: energy shaping on the first robot at 0.25 ms."""
-        robot, found = load_robot(self.robots[0]), []
-        base: list[Row] = []
-        for name, edit in VARIANTS.items():
-            legs = MujocoSimulator(
-                robot, len(self.commands) * self.repeats, timestep=2.5e-4,
-                threads=self.threads, edit=edit,
-            )  # fmt: skip
-            rows = self._rows("energy-shaping", robot, 2.5e-4, legs)
-            base = base or rows
-            found.append({
-                "variant": name,
-                "robot": robot.name,
-                "largest_median_shift_m": _largest(base, rows, "median_error_m"),
-                "largest_std_change_m": _largest(base, rows, "std_m"),
-            })  # fmt: skip
-        return found
 
 
 def _fits(name: str, robot: Robot) -> bool:
@@ -206,14 +144,6 @@ def _moves(one: Row, other: Row, name: str) -> bool:
         return True
     error = np.hypot(one[f"{name}_standard_error"], other[f"{name}_standard_error"])
     return bool(abs(one[name] - other[name]) > max(TOLERANCE, 2 * error))
-
-
-def _largest(one: list[Row], other: list[Row], name: str) -> float | None:
-    """Return the largest change of a statistic, None where one of them has no hops."""
-    pairs = [(a[name], b[name]) for a, b in zip(one, other, strict=True)]
-    if any(value is None for pair in pairs for value in pair):
-        return None
-    return max((abs(float(a - b)) for a, b in pairs), default=None)
 
 
 def _says(step: float | None) -> str:

@@ -34,7 +34,7 @@ def test_a_policy_hops_on_its_own_robot_alone():
     assert _fits("energy-shaping", load_robot("legv1"))
 
 
-def test_energy_shaping_hops_alike_at_both_steps_and_in_mujoco():
+def test_energy_shaping_hops_alike_at_both_steps():
     study = PhysicsStep(
         ("energy-shaping",), ("legv2-paper",), (0.3,), 5e-4, halvings=1, repeats=3, duration=4,
         threads=1,
@@ -43,6 +43,3 @@ def test_energy_shaping_hops_alike_at_both_steps_and_in_mujoco():
     coarse, fine = result["rows"]
     assert coarse["hops"] >= 10
     assert coarse["median_error_m"] == pytest.approx(fine["median_error_m"], abs=0.005)
-    assert [row["variant"] for row in result["variants"]][:2] == ["as it is", "elliptic cone"]
-    assert result["variants"][0]["largest_median_shift_m"] == 0
-    assert all(row["largest_median_shift_m"] < 0.02 for row in result["variants"])
