@@ -1,12 +1,10 @@
-from xml.etree import ElementTree
-
 import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hopping_leg.robot import build_model, dynamics, kinematics, load_robot, shipped_robots, to_urdf
+from hopping_leg.robot import build_model, dynamics, kinematics, load_robot, to_urdf
 from tests.robot.legs import SEEDS, posed, random_robot, random_state
 
 
@@ -69,12 +67,6 @@ def test_a_foot_out_of_reach_has_no_angles(distance, direction):
     assert np.isnan(kinematics.joint_angles(robot, foot)).all()
 
 
-def test_the_straight_leg_is_within_reach():
-    robot = load_robot("legv2")
-    q = kinematics.joint_angles(robot, np.array([robot.thigh.length + robot.shank.length, 0.0]))
-    np.testing.assert_allclose(q, 0, atol=1e-6)
-
-
 @settings(max_examples=25)
 @given(SEEDS)
 def test_foot_and_clearances_agree_with_mujoco(seed):
@@ -118,15 +110,3 @@ def test_mujoco_reads_the_same_dynamics_from_the_urdf(seed):
     height, rate, q, qd = random_state(rng)
     data = posed(model, height, rate, q, qd)
     check_mass_and_bias(robot, model, data, q, qd, [0, robot.hip.armature, robot.knee.armature])
-
-
-@pytest.mark.parametrize("name", shipped_robots())
-def test_limits_stand_in_the_file(name):
-    robot = load_robot(name)
-    root = ElementTree.fromstring(to_urdf(robot))
-    for joint in ("hip", "knee"):
-        parameters = getattr(robot, joint)
-        limit = root.find(f"joint[@name='{joint}']/limit").attrib
-        assert float(limit["effort"]) == parameters.torque_limit
-        assert float(limit["velocity"]) == parameters.no_load_speed
-        assert float(limit["lower"]) == parameters.stop_lower

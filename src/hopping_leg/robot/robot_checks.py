@@ -48,9 +48,8 @@ PLAUSIBLE: dict[str, tuple[float, float]] = {
 """Least and largest values, SI, that a leg on a rail may have, by the last part of the path."""
 _WIDEST = {"leg": 2 * math.pi, "pendulum": 12 * math.pi}
 """Largest joint limits, rad, by the robot's kind."""
-_CROSSWAYS = 1.2  # share of an inertia that the width of a link and its motor may add
-_LEAST_GYRATION = 0.05  # radius of gyration over length that a link hardly falls below
-_ARMATURES = (5e-3, 20.0)  # armature over what rotor, gear and belt reflect
+_INERTIAS = (2e-3, 1.0)
+"""Inertia of a link over its mass and the square of its length."""
 _ROUNDING = 1.001
 _STOPS = {f"{joint}.stop_{end}" for joint in JOINTS for end in ("lower", "upper")}
 
@@ -100,21 +99,9 @@ def doubts_of_values(robot: Robot, stated: Tree, origin: str) -> Iterator[str]:
         low, high = plausible.get(path.rpartition(".")[2], (-math.inf, math.inf))
         if not path.startswith("reality."):
             yield from _beyond(origin, path, entry["value"], low, high, entry["unit"])
-    balls = (robot.base.radius, robot.knee_cap.radius, robot.foot.radius)
-    links = (("thigh", robot.thigh), ("shank", robot.shank))
-    for (name, link), above, below in zip(links, balls, balls[1:], strict=False):
-        # the farther apart the two ends at which all mass sits, the larger is the inertia
-        reach = link.reach + below - link.com
-        most = _CROSSWAYS * link.mass * (link.com + above) * reach
-        least = link.mass * (_LEAST_GYRATION * link.length) ** 2
-        if least < most:
-            why = f", or state '{name}.extent' where a weight sticks out"
-            yield from _beyond(origin, f"{name}.inertia", link.inertia, least, most, "kg m2", why)
-    for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
-        ratio = joint.motor.gear_ratio * joint.belt_ratio
-        low, high = (share * joint.motor.rotor_inertia * ratio**2 for share in _ARMATURES)
-        why = "; rotor, gear and belt reflect about that"
-        yield from _beyond(origin, f"{name}.armature", joint.armature, low, high, "kg m2", why)
+    for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
+        low, high = (share * link.mass * link.reach**2 for share in _INERTIAS)
+        yield from _beyond(origin, f"{name}.inertia", link.inertia, low, high, "kg m2")
     if robot.kind == "leg" and not _stands(robot):
         yield (
             f"{origin}: within 'hip.lower' to 'knee.upper' the foot never comes below the hip; is a"
@@ -123,12 +110,12 @@ def doubts_of_values(robot: Robot, stated: Tree, origin: str) -> Iterator[str]:
 
 
 def _beyond(
-    origin: str, path: str, value: float, low: float, high: float, unit: str, why: str = ""
+    origin: str, path: str, value: float, low: float, high: float, unit: str
 ) -> Iterator[str]:
     if not low <= value <= high:
         yield (
             f"{origin}: '{path}' is {value:.5g} {unit} but hardly beyond {low:.3g} to {high:.3g}"
-            f" {unit}{why}; check its unit and decimal point."
+            f" {unit}; check its unit and decimal point."
         )
 
 
