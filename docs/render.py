@@ -83,7 +83,7 @@ def precision(file: str, highest: float) -> str:
 
     rows = []
     for name, one in accuracies(read(file)["summary"], highest).items():
-        values = list(vars(one).values())
+        values = list(one.values())
         cells = [*(1e3 * v for v in values[:5]), *values[5:8], *(100 * v for v in values[8:])]
         rows.append([name, *map(number, cells)])
     titles = [

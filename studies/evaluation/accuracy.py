@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from statistics import mean
 from typing import Any
 
@@ -10,29 +9,11 @@ LOWER = 0.34
 """Commands up to which less scatter is asked for, m."""
 
 
-@dataclass(frozen=True)
-class Accuracy:
-    """How near a controller's hops come to its commands."""
-
-    worst_error_m: float
-    """Largest magnitude of the median error of a command."""
-    mean_error_m: float
-    lower_std_m: float
-    """Largest standard deviation of the apexes at commands up to ``LOWER``."""
-    worst_std_m: float
-    mean_std_m: float
-    skipped_hops: int
-    body_contacts: int
-    fewest_hops_per_s: float
-    least_flight: float
-    """Smallest share of the time in flight at a command."""
-    mean_flight: float
-
-
-def accuracies(rows: Iterable[Mapping[str, Any]], highest: float) -> dict[str, Accuracy]:
+def accuracies(rows: Iterable[Mapping[str, Any]], highest: float) -> dict[str, dict[str, float]]:
     """Return the accuracy of every controller of an evaluation, at commands up to ``highest``, m.
 
-    ``rows`` are its ``summary``, as JSON values.
+    ``rows`` are its ``summary``, as JSON values. Errors are magnitudes of a command's median error,
+    stds those of its apexes, lower ones at commands up to ``LOWER``, lengths in m.
     """
     rows_of: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
@@ -41,16 +22,23 @@ def accuracies(rows: Iterable[Mapping[str, Any]], highest: float) -> dict[str, A
     return {name: _accuracy(own) for name, own in rows_of.items()}
 
 
-def _accuracy(rows: list[Mapping[str, Any]]) -> Accuracy:
+def _accuracy(rows: list[Mapping[str, Any]]) -> dict[str, float]:
     errors = [abs(_known(row["median_error_m"])) for row in rows]
     spreads = [_known(row["std_m"]) for row in rows]
     lower = [s for s, row in zip(spreads, rows, strict=True) if row["command_m"] <= LOWER]
     flights = [row["flight_fraction"] for row in rows]
-    return Accuracy(
-        max(errors), mean(errors), max(lower, default=0.0), max(spreads), mean(spreads),
-        sum(row["skipped_hops"] for row in rows), sum(row["body_contacts"] for row in rows),
-        min(row["hop_rate_hz"] for row in rows), min(flights), mean(flights),
-    )  # fmt: skip
+    return {
+        "worst_error_m": max(errors),
+        "mean_error_m": mean(errors),
+        "lower_std_m": max(lower, default=0.0),
+        "worst_std_m": max(spreads),
+        "mean_std_m": mean(spreads),
+        "skipped_hops": sum(row["skipped_hops"] for row in rows),
+        "body_contacts": sum(row["body_contacts"] for row in rows),
+        "fewest_hops_per_s": min(row["hop_rate_hz"] for row in rows),
+        "least_flight": min(flights),
+        "mean_flight": mean(flights),
+    }
 
 
 def _known(value: float | None) -> float:

@@ -8,7 +8,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig
 from hopping_leg.controllers.command_schedule import command_range
 from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller
-from hopping_leg.evaluate import entries, runner
+from hopping_leg.evaluate import Entry, runner
 from hopping_leg.identify import excitation, play_excitation
 from hopping_leg.identify.optimizers import SearchOptions
 from hopping_leg.identify.paper_excitation import Strokes, adapt, fixed_base, moving_base
@@ -191,7 +191,7 @@ def hops_of(
     high is asked for the highest command that it knows.
     """
     judged = runner.evaluate(
-        [entries.entry_of("policy", WithinRange(controller, leg))],
+        [Entry("policy", WithinRange(controller, leg))],
         RolloutConfig(leg, disturbance_of(leg), threads=1),
         commands=tuple(commands),
         repeats=repeats,

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from hopping_leg.controllers import Controller
+from hopping_leg.controllers.energy_shaping.controller import EnergyShaping
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import NO_MISMATCH, Latency, Robot, load_robot, parent_robot, shipped_robots
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
@@ -92,3 +94,11 @@ def simulated(source: str) -> Robot:
 def disturbance_of(robot: Robot) -> NoiseAndDelay:
     """Return what a leg is tried with on top of what it brings: nothing, if it brings anything."""
     return NoiseAndDelay() if robot.reality.neutral else NO_NOISE
+
+
+def fingerprint(controller: Controller) -> str:
+    """Return what distinguishes a controller from others of its name, as far as is known."""
+    if isinstance(controller, EnergyShaping):
+        return repr((controller.gains, controller.options))
+    named = f"{type(controller).__module__}.{type(controller).__qualname__}"
+    return str(getattr(controller, "digest", named))

@@ -19,11 +19,11 @@ from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.stop_reasons import SupervisorInput
 from hopping_leg.deploy.supervisor import State, SupervisorState, supervise
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import entries, runner, statistics, trials
+from hopping_leg.evaluate import runner, statistics, trials
 from hopping_leg.hop_detection import find_hops, measure_hops
 from hopping_leg.robot import JOINTS, Robot, load_robot, parent_robot
 from studies.shared import Row, do_all
-from studies.sim_to_real.twins import disturbance_of, drawn_twin
+from studies.sim_to_real.twins import disturbance_of, drawn_twin, fingerprint
 
 COMMANDS = (0.22, 0.24, 0.26, 0.28, 0.30, 0.32, 0.34, 0.36, 0.38, 0.40)
 """Apex heights of a leg of the paper's size, m; others are asked for as many times as much."""
@@ -227,7 +227,7 @@ class ZeroShot:
     def _trial(self, source: str, name: str) -> tuple[Any, ...]:
         believed = believed_of(source)
         asked = {
-            "controller": entries.fingerprint(_load(name, believed)),
+            "controller": fingerprint(_load(name, believed)),
             "robot": load_robot(source).digest,
             "believed": believed.digest,
             "commands": self.commands,

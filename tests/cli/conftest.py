@@ -10,7 +10,7 @@ def spring(monkeypatch):
     """Every controller that is named is a spring made for 0.29 to 0.31 m."""
 
     def load(names, robot, rate):
-        return [Entry(name, Spring(robot), (0.29, 0.31)) for name in names]
+        return [Entry(name, Spring(robot, (0.29, 0.31))) for name in names]
 
     monkeypatch.setattr("hopping_leg.evaluate.entries.load_entries", load)
 

@@ -11,8 +11,8 @@ class Spring:
 
     name = "spring"
 
-    def __init__(self, robot, stiffness=800.0, push=30.0):
-        self.robot, self.stiffness, self.push = robot, stiffness, push
+    def __init__(self, robot, command_range=None):
+        self.robot, self.command_range = robot, command_range
 
     def reset(self, count):
         self.count = count
@@ -22,8 +22,8 @@ class Spring:
         down, forward = kinematics.foot_position(self.robot, q).T
         rate, slip = kinematics.foot_velocity(self.robot, q, qd).T
         extending = (rate > 0) & (down < 0.24)
-        push = self.push * (measurement.command[:, 0] / 0.3) ** 3
-        force = self.stiffness * (0.2 - down) - 4 * rate + push * extending
+        push = 30.0 * (measurement.command[:, 0] / 0.3) ** 3
+        force = 800.0 * (0.2 - down) - 4 * rate + push * extending
         sideways = -150 * forward - 5 * slip
         jacobian = kinematics.jacobian(self.robot, q)
         return np.einsum("nij,ni->nj", jacobian, np.stack([force, sideways], axis=1))

@@ -11,7 +11,6 @@ from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Entry, entries, evaluate
 from hopping_leg.evaluate.entries import load_entries
-from hopping_leg.evaluate.result import ResultCache
 from hopping_leg.evaluate.robustness import make_suite, run_suite
 from hopping_leg.evaluate.runner import _note_stopped
 from hopping_leg.evaluate.trials import (
@@ -62,9 +61,9 @@ def test_the_stiff_floor_changes_the_contact_only(robot):
         floor_robot(robot, "lava")
 
 
-def test_what_is_left_out_or_coarse_is_noted(setup, spring):
+def test_what_is_left_out_or_coarse_is_noted(setup, robot):
     result = evaluate(
-        [Entry("spring", spring, (0.29, 0.33))],
+        [Entry("spring", Spring(robot, (0.29, 0.33)))],
         dataclasses.replace(setup, timestep=1e-3),
         commands=[0.30],
         repeats=1,
@@ -76,7 +75,7 @@ def test_what_is_left_out_or_coarse_is_noted(setup, spring):
 
 
 def robustness(entries, setup, **options):
-    run_suite(entries, make_suite(setup, axes=["links"], **options), ResultCache(Path("unused")))
+    run_suite(entries, make_suite(setup, axes=["links"], **options))
 
 
 @pytest.mark.parametrize("suite", [evaluate, robustness])
@@ -91,7 +90,7 @@ def robustness(entries, setup, **options):
     ],
 )
 def test_every_suite_refuses_bad_input_in_a_sentence(setup, suite, names, options, sentence):
-    entries = [Entry(name, Spring(setup.robot), (0.2, 0.3)) for name in names]
+    entries = [Entry(name, Spring(setup.robot, (0.2, 0.3))) for name in names]
     with pytest.raises(UsageError, match=sentence):
         suite(entries, setup, **{"commands": [0.25], **options})
 

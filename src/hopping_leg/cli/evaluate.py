@@ -6,7 +6,7 @@ minus command; negative is too low.
 
 `--suite robustness` asks how far the world may differ from what controllers believe before they
 fail: every axis (payload, friction, delay, noise, pushes, ...) is changed alone in rising levels,
-then all at once. A run of it that was killed goes on where it was.
+then all at once.
 
 Examples:
   hop evaluate fast energy-shaping
@@ -157,14 +157,13 @@ def _judge_robustness(args: Evaluate, command: str) -> None:
     """Run the suite, print the scores, write numbers and figure."""
     from hopping_leg import figure_style
     from hopping_leg.evaluate import figures, tables
-    from hopping_leg.evaluate.result import ResultCache
     from hopping_leg.evaluate.robustness import make_suite, run_suite
 
     entries, setup = args.load()
     out, heights, seeds = args.out or Path("runs/robustness"), args.commands, args.seeds
     suite = make_suite(setup, axes=args.axes, commands=heights, repeats=seeds, seed=args.seed)
     with progress.Progress(parts=len(entries)) as bar:
-        found = run_suite(entries, suite, ResultCache(out), bar.show)
+        found = run_suite(entries, suite, bar.show)
     result = {"command": command, **found}
     file, figure = args.json or out / "robustness.json", out / "robustness.svg"
     tables.print_robustness(plain_console(), result)

@@ -207,13 +207,13 @@ def _hop(
     from hopping_leg.controllers import RolloutConfig
     from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller
     from hopping_leg.evaluate import runner
-    from hopping_leg.evaluate.entries import entry_of
+    from hopping_leg.evaluate.entries import Entry
     from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 
     told: dict[str, tuple[str | Path, str]] = {**policies}
     told[ENERGY_SHAPING] = ENERGY_SHAPING, believed
     entries = [
-        entry_of(name, load_controller(what, load_robot(robot), other="accept"))
+        Entry(name, load_controller(what, load_robot(robot), other="accept"))
         for name, (what, robot) in told.items()
     ]
     noise = NoiseAndDelay() if twin.reality.neutral else NO_NOISE  # a twin brings its own

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hopping_leg.controllers import Controller
-from hopping_leg.controllers.energy_shaping.controller import EnergyShaping
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller, shipped_policies
 from hopping_leg.errors import PolicyError, UsageError
@@ -21,12 +20,15 @@ class Entry:
     label: str
     """Name in all tables."""
     controller: Controller
-    command_range: tuple[float, float] | None = None
-    """Heights it was made for, m, or None for any."""
     group: str | None = None
     """Name shared by policies of one recipe that differ in the training seed."""
     notes: tuple[str, ...] = ()
     """What a reader of the results must know about it."""
+
+    @property
+    def command_range(self) -> tuple[float, float] | None:
+        """Heights it was made for, m, or None for any."""
+        return getattr(self.controller, "command_range", None)
 
     def reaches(self, heights: Iterable[float]) -> bool:
         """Tell whether it was made for all of some heights, m."""
@@ -74,14 +76,6 @@ def check_entries(entries: Sequence[Entry], commands: Sequence[float]) -> None:
                 )
 
 
-def fingerprint(controller: Controller) -> str:
-    """Return what distinguishes a controller from others of its name, as far as is known."""
-    if isinstance(controller, EnergyShaping):
-        return repr((controller.gains, controller.options))
-    named = f"{type(controller).__module__}.{type(controller).__qualname__}"
-    return str(getattr(controller, "digest", named))
-
-
 def _expand(text: str) -> list[tuple[str, str]]:
     """Return the label and source of everything that a text names."""
     if not any(sign in text for sign in "*?["):
@@ -97,15 +91,10 @@ def _expand(text: str) -> list[tuple[str, str]]:
     return [(path, path) for path in found]
 
 
-def entry_of(label: str, controller: Controller) -> Entry:
-    """Return a controller as an entry, a policy with the range of commands that it was made for."""
-    return Entry(label, controller, getattr(controller, "command_range", None))
-
-
-def _load(name: str, source: str, robot: Robot, rate: float) -> Entry:
+def _load(label: str, source: str, robot: Robot, rate: float) -> Entry:
     controller = load_controller(source, robot, rate=rate, other="accept", simulated=True)
-    note = controller.stranger(robot, name) if isinstance(controller, Policy) else None
-    return replace(entry_of(name, controller), notes=(note,) if note else ())
+    note = controller.stranger(robot, label) if isinstance(controller, Policy) else None
+    return Entry(label, controller, notes=(note,) if note else ())
 
 
 def _grouped(entries: list[Entry]) -> list[Entry]:

@@ -1,13 +1,10 @@
-"""The numbers of an evaluation, as typed records and as JSON; and a cache of results."""
+"""The numbers of an evaluation, as typed records and as JSON."""
 
-import json
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Any
 
 from hopping_leg.evaluate.motor_load import MotorLoad
-from hopping_leg.io import plain, write_json
+from hopping_leg.io import plain
 
 SCHEMA = 2
 """Version of the JSON, raised when a name changes its meaning."""
@@ -154,30 +151,3 @@ class Evaluation:
     def to_json(self) -> dict[str, Any]:
         """Return plain values; numbers that do not exist are None."""
         return {"schema": SCHEMA, **plain(asdict(self))}
-
-
-@dataclass(frozen=True)
-class ResultCache:
-    """Runs work once: its result lies in a folder and is taken from there the next time."""
-
-    folder: Path
-    on_begin: Callable[[str], None] = lambda words: None
-    """Told, in words, what begins."""
-
-    def load_or_run(
-        self, name: str, words: str, asked: dict[str, Any], work: Callable[[], dict[str, Any]]
-    ) -> dict[str, Any]:
-        """Return the kept result of the same work, or do it and keep its result.
-
-        ``asked`` is all that the result depends on; it and the result are JSON values.
-        """
-        file = self.folder / f"{name}.json"
-        asked = json.loads(json.dumps(asked))
-        if file.exists():
-            kept: dict[str, Any] = json.loads(file.read_bytes())
-            if kept["asked"] == asked:
-                return dict(kept["result"])
-        self.on_begin(words)
-        result = work()
-        write_json(file, {"asked": asked, "result": result})
-        return dict(json.loads(file.read_bytes())["result"])

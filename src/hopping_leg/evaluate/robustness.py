@@ -18,10 +18,8 @@ from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.controllers.rollout import Perturbation
 from hopping_leg.evaluate import metrics, runner, statistics, trials
-from hopping_leg.evaluate.entries import Entry, check_entries, fingerprint
-from hopping_leg.evaluate.result import ResultCache
+from hopping_leg.evaluate.entries import Entry, check_entries
 from hopping_leg.evaluate.robustness_axes import AXES, NOMINAL, Axis, Case, axes_named
-from hopping_leg.io import safe_file_name
 
 SCHEMA = 2
 """Version of the JSON, raised when a name changes its meaning."""
@@ -96,10 +94,9 @@ def make_suite(
 def run_suite(
     entries: Sequence[Entry],
     suite: Suite,
-    cache: ResultCache,
-    on_progress: Callable[[str, float], None] = lambda label, share: None,
+    on_progress: Callable[[str, float], None] = lambda _label, _share: None,
 ) -> dict[str, Any]:
-    """Let every controller meet every axis; the cache keeps the trials of each pair.
+    """Let every controller meet every axis.
 
     Returns:
         ``scores``, ``levels``, ``axes``, ``conditions``, ``versions`` and
@@ -109,13 +106,7 @@ def run_suite(
         UsageError: A command is out of an entry's range, or a name is taken twice.
     """
     check_entries(entries, suite.commands)
-    versions, parts = runner.software_versions(), (NOMINAL, *suite.axes)
-    asked = {
-        **suite.conditions,
-        "schema": SCHEMA,
-        "versions": versions,
-        "worlds": [(axis.name, axis.levels, axis.moderate) for axis in AXES],
-    }
+    parts = (NOMINAL, *suite.axes)
     scores: list[dict[str, Any]] = []
     levels: list[dict[str, Any]] = []
     for entry in entries:
@@ -125,17 +116,9 @@ def run_suite(
             def tick(done: int, ticks: int, label: str = entry.label, number: int = number) -> None:
                 on_progress(label, (number + done / ticks) / len(parts))
 
-            kept = cache.load_or_run(
-                f"{safe_file_name(entry.label)}-{axis.name}",
-                f"{entry.label}: {axis.name}",
-                {**asked, "controller": fingerprint(entry.controller)},
-                functools.partial(_meet, entry.controller, suite, axis, tick),
-            )
-            met[axis.name] = pl.DataFrame(kept["outcomes"])
-            on_progress(entry.label, (number + 1) / len(parts))
-        levels += [
-            row for name, found in met.items() for row in level_rows(entry.label, name, found)
-        ]
+            plan = make_trials(axis, suite)
+            met[axis.name] = pl.DataFrame(run_axis(entry.controller, suite.setup, plan, tick))
+            levels += level_rows(entry.label, axis.name, met[axis.name])
         del met[NOMINAL.name]
         scores += score_rows(entry.label, met, suite.seed)
     return {
@@ -144,15 +127,9 @@ def run_suite(
         "levels": levels,
         "axes": [{k: v for k, v in vars(axis).items() if k != "alter"} for axis in suite.axes],
         "conditions": suite.conditions,
-        "versions": versions,
+        "versions": runner.software_versions(),
         "notes": [note for entry in entries for note in entry.notes],
     }
-
-
-def _meet(
-    controller: Controller, suite: Suite, axis: Axis, on_tick: Callable[[int, int], None]
-) -> dict[str, Any]:
-    return {"outcomes": run_axis(controller, suite.setup, make_trials(axis, suite), on_tick)}
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,8 @@
-"""Results in words and tables, one list of columns for the terminal and for pages; lengths in mm.
+"""Results in words and tables, the same columns for the terminal and for pages; lengths in mm.
 
 Rows are the values of the JSON.
 """
 
-import itertools
 import textwrap
 from collections.abc import Callable, Sequence
 from statistics import median
@@ -14,7 +13,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from hopping_leg.evaluate.result import Evaluation, Summary
+from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.html_page import Column, table
 from hopping_leg.terminal import print_table
 
@@ -28,11 +27,7 @@ def millimetres(value: float | None, sign: bool = False) -> str:
     return f"{1e3 * value:{'+' if sign else ''}z.1f}" if there else "-"  # type: ignore[operator]
 
 
-def _positive(value: float) -> bool:
-    return value > 0
-
-
-def column(
+def _column(
     heading: str,
     name: str,
     form: str = "",
@@ -53,67 +48,64 @@ def _pair(heading: str, form: str, *names: str, sign: bool = False) -> Column:
     return Column(heading, lambda row: form.format(*(millimetres(row[n], sign) for n in names)))
 
 
-_CONTROLLER = column("controller", "controller")
-_COMMAND = column("command / m", "command_m", ".2f")
-_ERROR = column("median error / mm", "median_error_m", "+z.1f", 1e3)
+def _count(heading: str, name: str) -> Column:
+    """Return a column of what should not have happened."""
+    return _column(heading, name, bad=lambda count: count > 0)
+
+
+_CONTROLLER = _column("controller", "controller")
+_COMMAND = _column("command / m", "command_m", ".2f")
+_ERROR = _column("median error / mm", "median_error_m", "+z.1f", 1e3)
 _INTERVAL = _pair(
     "95 % interval / mm", "{} to {}", "median_error_low_m", "median_error_high_m", sign=True
 )
-_STD = column("std / mm", "std_m", ".1f", 1e3)
-_HOPS = column("hops", "hops")
-_SKIPPED = column("skipped", "skipped_hops", bad=_positive)
-_RATE = column("hops / s", "hop_rate_hz", ".2f")
-_FLIGHT = column("flight / %", "flight_fraction", ".0f", 100)
-_LOWEST = column("lowest base / mm", "min_base_height_m", ".0f", 1e3)
-_CONTACTS = column("body contacts", "body_contacts", bad=_positive)
+_STD = _column("std / mm", "std_m", ".1f", 1e3)
+_HOPS = _column("hops", "hops")
+_SKIPPED = _count("skipped", "skipped_hops")
+_FLIGHT = _column("flight / %", "flight_fraction", ".0f", 100)
+_LOWEST = _column("lowest base / mm", "min_base_height_m", ".0f", 1e3)
+_CONTACTS = _count("body contacts", "body_contacts")
 
 SHORT = (_CONTROLLER, _COMMAND, _ERROR, _STD, _HOPS, _SKIPPED, _FLIGHT, _LOWEST, _CONTACTS)
 """What the terminal shows of the summary."""
 
 SUMMARY = (
-    *(_CONTROLLER, _COMMAND, _ERROR, _INTERVAL, _STD, column("IQR / mm", "iqr_m", ".1f", 1e3)),
-    *(_HOPS, _SKIPPED, _RATE, _FLIGHT, column("sink / mm", "max_sink_m", ".0f", 1e3)),
-    *(_LOWEST, _CONTACTS),
+    *(_CONTROLLER, _COMMAND, _ERROR, _INTERVAL, _STD, _column("IQR / mm", "iqr_m", ".1f", 1e3)),
+    *(_HOPS, _SKIPPED, _column("hops / s", "hop_rate_hz", ".2f"), _FLIGHT),
+    *(_column("sink / mm", "max_sink_m", ".0f", 1e3), _LOWEST, _CONTACTS),
 )
-LADDER = (_CONTROLLER, _COMMAND, _ERROR, _STD, _HOPS, _SKIPPED, _CONTACTS)
 
 LOAD = (
     _CONTROLLER,
     _COMMAND,
-    column("peak hip / N m", "peak_hip_torque_nm", ".1f"),
-    column("peak knee / N m", "peak_knee_torque_nm", ".1f"),
-    column("RMS hip / N m", "rms_hip_torque_nm", ".1f"),
-    column("RMS knee / N m", "rms_knee_torque_nm", ".1f"),
-    column("RMS of rated / %", "rated_torque_share", ".0f", 100, bad=lambda share: share > 1),
-    column("limited after / min", "thermal_minutes", ".1f"),
-    column("mechanical / W", "mean_power_w", ".1f"),
-    column("electrical / W", "mean_electrical_power_w", ".1f"),
-    column("peak braking / W", "peak_regeneration_w", ".0f"),
-    column("bus rise / V", "bus_voltage_rise_v", ".1f"),
+    _column("peak hip / N m", "peak_hip_torque_nm", ".1f"),
+    _column("peak knee / N m", "peak_knee_torque_nm", ".1f"),
+    _column("RMS hip / N m", "rms_hip_torque_nm", ".1f"),
+    _column("RMS knee / N m", "rms_knee_torque_nm", ".1f"),
+    _column("RMS of rated / %", "rated_torque_share", ".0f", 100, bad=lambda share: share > 1),
+    _column("limited after / min", "thermal_minutes", ".1f"),
+    _column("mechanical / W", "mean_power_w", ".1f"),
+    _column("electrical / W", "mean_electrical_power_w", ".1f"),
+    _column("peak braking / W", "peak_regeneration_w", ".0f"),
+    _column("bus rise / V", "bus_voltage_rise_v", ".1f"),
 )
 
 JOINTS = (
     _CONTROLLER,
     _COMMAND,
-    column("knee speed / (rad/s)", "peak_knee_speed_rad_s", ".1f"),
-    column("torque reversals / Hz", "torque_reversals_hz", ".1f"),
-    column("outside soft limits / %", "outside_limits_fraction", ".1f", 100),
-    column("soft limits, RMS / N m", "soft_limit_rms_nm", ".2f"),
-    column("soft limits' share of torque / %", "soft_limit_share", ".1f", 100),
-    column("stop contacts", "stop_contacts", bad=_positive),
+    _column("knee speed / (rad/s)", "peak_knee_speed_rad_s", ".1f"),
+    _column("torque reversals / Hz", "torque_reversals_hz", ".1f"),
+    _column("outside soft limits / %", "outside_limits_fraction", ".1f", 100),
+    _column("soft limits, RMS / N m", "soft_limit_rms_nm", ".2f"),
+    _column("soft limits' share of torque / %", "soft_limit_share", ".1f", 100),
+    _count("stop contacts", "stop_contacts"),
 )
 
 GROUPS = (
-    column("group", "group"),
-    _COMMAND,
-    column("policies", "policies"),
-    column("never hopped", "motionless", bad=_positive),
-    _ERROR,
-    _INTERVAL,
-    column("worst |error| / mm", "worst_abs_error_m", ".1f", 1e3),
-    column("median std / mm", "median_std_m", ".1f", 1e3),
-    _SKIPPED,
-    _CONTACTS,
+    _column("group", "group"),
+    *(_COMMAND, _column("policies", "policies"), _count("never hopped", "motionless")),
+    *(_ERROR, _INTERVAL, _column("worst |error| / mm", "worst_abs_error_m", ".1f", 1e3)),
+    *(_column("median std / mm", "median_std_m", ".1f", 1e3), _SKIPPED, _CONTACTS),
 )
 
 ESTIMATORS = (
@@ -124,38 +116,39 @@ ESTIMATORS = (
     _HOPS,
 )
 
-_NEIGHBOURS = (
+NEIGHBOURS = (
     _CONTROLLER,
-    column("lower command / m", "lower_m", ".2f"),
-    column("higher command / m", "upper_m", ".2f"),
-    column("p, rank sums of runs", "p", ".1g", bad=lambda p: p >= 1e-3),
-    column("Cliff's delta", "cliffs_delta", "+.3f"),
-    column("95 % from", "cliffs_delta_low", "+.3f"),
-    column("to", "cliffs_delta_high", "+.3f"),
-    column("hops in the overlap / %", "overlap", ".1f", 100),
+    _column("lower command / m", "lower_m", ".2f"),
+    _column("higher command / m", "upper_m", ".2f"),
+    _column("p, rank sums of runs", "p", ".1g", bad=lambda p: p >= 1e-3),
+    _column("Cliff's delta", "cliffs_delta", "+.3f"),
+    _column("95 % from", "cliffs_delta_low", "+.3f"),
+    _column("to", "cliffs_delta_high", "+.3f"),
+    _column("hops in the overlap / %", "overlap", ".1f", 100),
 )
 
 
 def evaluation_tables(evaluation: Row) -> dict[str, Markup]:
     """Return every table of a page, by what it is about, from an evaluation's JSON."""
-    secondary, summary = evaluation["secondary"], evaluation["summary"]
-    neighbours = [
+    summary, secondary = evaluation["summary"], evaluation["secondary"] or {"summary": []}
+    pairs = [
         {"controller": one["controller"], **pair}
         for one in evaluation["neighbours"]
         for pair in one["neighbours"]
     ]
+    about = "estimated minus true, mean ± standard deviation"
     return {
         "summary": table(SUMMARY, summary),
-        "secondary": table(SUMMARY, secondary["summary"] if secondary else []),
+        "secondary": table(SUMMARY, secondary["summary"]),
         "groups": table(GROUPS, evaluation["groups"]),
         "load": table(LOAD, summary),
         "joints": table(JOINTS, summary),
-        "ladder": table(LADDER, evaluation["ladder"]),
-        "distributions": table(_NEIGHBOURS, neighbours),
-        "staircase": _staircase_table(evaluation["staircase"]),
-        "estimators": table(
-            ESTIMATORS, evaluation["estimators"], "estimated minus true, mean ± standard deviation"
+        "ladder": table(
+            (_CONTROLLER, _COMMAND, _ERROR, _STD, _HOPS, _SKIPPED, _CONTACTS), evaluation["ladder"]
         ),
+        "distributions": table(NEIGHBOURS, pairs),
+        "staircase": _staircase_table(evaluation["staircase"]),
+        "estimators": table(ESTIMATORS, evaluation["estimators"], about),
     }
 
 
@@ -165,10 +158,13 @@ def _staircase_table(stairs: Sequence[Row]) -> Markup:
     def step(number: int, command: float) -> Column:
         return Column(f"{command:.2f} m", lambda row: millimetres(row["median_apexes_m"][number]))
 
-    steps = itertools.starmap(step, enumerate(stairs[0]["commands_m"] if stairs else ()))
-    runs = Column("runs monotone", lambda r: f"{r['monotone_runs']} of {r['runs']}")
-    monotone = Column("monotone", lambda r: "yes" if r["monotone"] else "no")
-    columns = (_CONTROLLER, *steps, monotone, runs, _SKIPPED)
+    commands = stairs[0]["commands_m"] if stairs else ()
+    columns = (
+        *(_CONTROLLER, *(step(number, command) for number, command in enumerate(commands))),
+        Column("monotone", lambda row: "yes" if row["monotone"] else "no"),
+        Column("runs monotone", lambda row: f"{row['monotone_runs']} of {row['runs']}"),
+        _SKIPPED,
+    )
     return table(columns, stairs, "median apex at each step / mm")
 
 
@@ -183,6 +179,8 @@ def verdict(evaluation: Evaluation, controller: str) -> str:
     if not errors:
         return "does not hop at any height."
     worst = max(errors, key=errors.__getitem__)
+    skipped, touched = (sum(r.skipped_hops for r in rows), sum(r.body_contacts for r in rows))
+    hops = skipped + sum(row.hops for row in rows)
     parts = [
         f"misses its command by {_mm(median(errors.values()))} in the median of"
         f" {len({row.command_m for row in rows})} heights and by {_mm(errors[worst])} at the worst,"
@@ -190,7 +188,10 @@ def verdict(evaluation: Evaluation, controller: str) -> str:
     ]
     if still := sorted({row.command_m for row in rows} - {row.command_m for row in errors}):
         parts.append(f"does not hop at {', '.join(f'{command:.2f}' for command in still)} m")
-    parts += [_skipped(rows), _contacts(sum(row.body_contacts for row in rows))]
+    parts.append(f"skips {skipped} of {hops} hops" if skipped else "skips no hop")
+    times = "once" if touched == 1 else f"{touched} times"
+    ground = f"base or knee touch the ground {times}" if touched else ""
+    parts.append(ground or "only the foot touches the ground")
     for stair in evaluation.staircase:
         if stair.controller == controller:
             rises = "rises" if stair.monotone else "does not rise"
@@ -205,16 +206,6 @@ def verdict(evaluation: Evaluation, controller: str) -> str:
     return f"{'; '.join(parts)}."
 
 
-def _skipped(rows: Sequence[Summary]) -> str:
-    skipped, hops = (sum(getattr(r, name) for r in rows) for name in ("skipped_hops", "hops"))
-    return f"skips {skipped} of {skipped + hops} hops" if skipped else "skips no hop"
-
-
-def _contacts(count: int) -> str:
-    times = "once" if count == 1 else f"{count} times"
-    return f"base or knee touch the ground {times}" if count else "only the foot touches the ground"
-
-
 def _mm(metres: float) -> str:
     return f"{1e3 * metres:.1f} mm"
 
@@ -227,42 +218,38 @@ def print_evaluation(console: Console, evaluation: Evaluation) -> None:
         title = f"On {c['robot']}, {c['floor']} floor, {c['seeds']} seeds from {c['seed']}:"
         _print_table(console, title, SHORT, one.to_json()["summary"])
     for name in evaluation.controllers:
-        console.print(f"{name} {verdict(evaluation, name)}", highlight=False)
-
-
-def _print_notes(console: Console, notes: Sequence[str]) -> None:
-    """Print what a reader must know before any table."""
-    for note in notes:
-        console.print(f"Note: {note}", highlight=False)
+        console.print(f"{name} {verdict(evaluation, name)}")
 
 
 def print_robustness(console: Console, result: Row) -> None:
     """Print notes and the scores on every axis."""
     _print_notes(console, result["notes"])
-    c, scores = result["conditions"], {(r["axis"], r["controller"]): r for r in result["scores"]}
-
-    def score(controller: str) -> Column:
-        def text(axis: str) -> str:
-            row = scores[axis, controller]
-            return f"{row['score']:.0%} [{row['low']:.0%}, {row['high']:.0%}]".replace("%", "")
-
-        return Column(controller, text)
-
-    columns = [Column("axis", str), *map(score, dict.fromkeys(name for _, name in scores))]
+    c = result["conditions"]
+    rows: dict[str, Row] = {}
+    for score in result["scores"]:
+        share, low, high = (f"{100 * score[name]:.0f}" for name in ("score", "low", "high"))
+        row = rows.setdefault(score["axis"], {"axis": score["axis"]})
+        row[score["controller"]] = f"{share} [{low}, {high}]"
     title = (
         f"Robustness on {c['robot']}: successful trials in % and their 95 % interval;"
         f" {', '.join(f'{command:g}' for command in c['commands_m'])} m,"
         f" {c['seeds']} seeds from {c['seed']}."
     )
-    axes = list(dict.fromkeys(axis for axis, _ in scores))
-    _print_table(console, title, columns, axes)
+    names = next(iter(rows.values()))
+    _print_table(console, title, [_column(name, name) for name in names], list(rows.values()))
+
+
+def _print_notes(console: Console, notes: Sequence[str]) -> None:
+    """Print what a reader must know before any table."""
+    for note in notes:
+        console.print(f"Note: {note}")
 
 
 def _print_table(
-    console: Console, title: str, columns: Sequence[Column], rows: Sequence[Any]
+    console: Console, title: str, columns: Sequence[Column], rows: Sequence[Row]
 ) -> None:
     """Print a table under a sentence, within 80 columns where names allow."""
-    console.print(title, highlight=False)
+    console.print(title)
     shown = Table(box=box.SIMPLE_HEAD, padding=0)
     shown.add_column(columns[0].heading, min_width=14)
     for column in columns[1:]:

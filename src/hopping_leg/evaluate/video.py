@@ -1,18 +1,16 @@
 """Short videos of hops side by side, rendered off screen in a process of its own.
 
-OpenGL drivers crash, hang or are missing; none of that may take an evaluation down. That process is
-``python -m hopping_leg.evaluate.video XML CLIPS OUT``, as MuJoCo chooses OpenGL's back end, EGL
-unless MUJOCO_GL names another, when it is imported.
+OpenGL drivers crash, hang or are missing; none of that may take an evaluation down. MuJoCo chooses
+OpenGL's back end when it is imported: EGL there, unless MUJOCO_GL names another.
 """
 
+import io
 import json
 import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Literal
 
 import mujoco
@@ -65,14 +63,14 @@ def fixed_traces(runs: Sequence[trials.Run], controller: str) -> dict[float, Tra
 def render_hops(
     robot: Robot, who: str, colour: str, traces: Mapping[float, Trace], kind: Animation = "webp"
 ) -> Video:
-    """Render a controller's hop at every command side by side, at half speed, given a run at each.
-
-    The controller has a name and a colour.
-    """
-    clips = [
-        Clip(who, colour, sample(trace, _first_apex(trace), CLIP_SECONDS))
-        for trace in traces.values()
-    ]
+    """Render the first hop that counts of a controller's runs side by side, at half speed."""
+    clips = []
+    for trace in traces.values():
+        time = trace.column("time_s")
+        apexes = time[trace_hops(trace).tick]
+        settled = apexes[apexes >= metrics.START_SECONDS]
+        start = float(settled[0] if len(settled) else min(metrics.START_SECONDS, time[-1]))
+        clips.append(Clip(who, colour, sample(trace, start, CLIP_SECONDS)))
     return render_clips(robot, clips, 1000 * SLOWDOWN / FRAME_RATE, kind)
 
 
@@ -89,56 +87,41 @@ def sample(
     return rows
 
 
-def _first_apex(trace: Trace) -> float:
-    """Return when the first apex after the start is, s."""
-    time = trace.column("time_s")
-    apexes = time[trace_hops(trace).tick]
-    settled = apexes[apexes >= metrics.START_SECONDS]
-    return float(settled[0] if len(settled) else min(metrics.START_SECONDS, time[-1]))
-
-
 def render_clips(
     robot: Robot, clips: Sequence[Clip], milliseconds: float, kind: Animation = "webp"
 ) -> Video:
     """Render clips of the same length side by side, each frame shown so long."""
-    with tempfile.TemporaryDirectory() as folder:
-        model, motion, out = (Path(folder) / n for n in ("leg.xml", "clips", f"hops.{kind}"))
-        spec = get_spec(robot)
-        spec.compile()
-        model.write_text(spec.to_xml(), encoding="utf-8")
-        content = {"milliseconds": milliseconds, "clips": [asdict(clip) for clip in clips]}
-        motion.write_text(json.dumps(content), encoding="utf-8")
-        command = [
-            sys.executable,
-            "-m",
-            "hopping_leg.evaluate.video",
-            *map(str, (model, motion, out)),
-        ]
-        try:
-            done = subprocess.run(
-                command,
-                env={"MUJOCO_GL": "egl", **os.environ},
-                capture_output=True,
-                text=True,
-                timeout=_TIMEOUT,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            return Video(None, f"it took longer than {_TIMEOUT:.0f} s")
-        if done.returncode == 0 and out.is_file():
-            return Video(out.read_bytes())
-    said = [line for line in done.stderr.splitlines() if line.strip() and line[0] != " "]
+    spec = get_spec(robot)
+    spec.compile()
+    asked = {"leg": spec.to_xml(), "clips": [asdict(clip) for clip in clips], "kind": kind}
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "hopping_leg.evaluate.video"],
+            env={"MUJOCO_GL": "egl", **os.environ},
+            input=json.dumps({**asked, "milliseconds": round(milliseconds)}).encode(),
+            capture_output=True,
+            timeout=_TIMEOUT,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return Video(None, f"it took longer than {_TIMEOUT:.0f} s")
+    if done.returncode == 0:
+        return Video(done.stdout)
+    lines = done.stderr.decode(errors="replace").splitlines()
+    said = [line for line in lines if line.strip() and line[0] != " "]
     reason = said[-1] if said else f"the renderer ended with code {done.returncode}"
     return Video(None, f"{reason} (Mesa's libegl1 would do, or MUJOCO_GL=osmesa and libosmesa6)")
 
 
-def _main(xml: str, motion: str, out: str) -> None:
-    """Render clips to a file; arguments as in the module's docstring."""
-    content = json.loads(Path(motion).read_text(encoding="utf-8"))
-    clips = [Clip(**clip) for clip in content["clips"]]
-    first, *others = _draw_frames(mujoco.MjModel.from_xml_path(xml), clips)
-    duration = round(content["milliseconds"])
-    first.save(out, save_all=True, append_images=others, duration=duration, loop=0, quality=60)
+def _main() -> None:
+    """Read what ``render_clips`` asks for, write the animation."""
+    asked = json.load(sys.stdin)
+    clips = [Clip(**clip) for clip in asked["clips"]]
+    first, *others = _draw_frames(mujoco.MjModel.from_xml_string(asked["leg"]), clips)
+    look = {"duration": asked["milliseconds"], "loop": 0, "quality": 60}
+    content = io.BytesIO()
+    first.save(content, asked["kind"], save_all=True, append_images=others, **look)
+    sys.stdout.buffer.write(content.getvalue())
 
 
 def _draw_frames(model: mujoco.MjModel, clips: Sequence[Clip]) -> list[Image.Image]:
@@ -187,4 +170,4 @@ def _mark(scene: mujoco.MjvScene, command: float) -> None:
 
 
 if __name__ == "__main__":
-    _main(*sys.argv[1:])
+    _main()
