@@ -6,7 +6,7 @@ again.
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -14,8 +14,8 @@ import numpy as np
 from hopping_leg.cli.options import Heights, JsonFile, at_least, mm, show_table
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller, robot_of
+from hopping_leg.evaluate.metrics import measure, pooled_apexes
 from hopping_leg.evaluate.trials import choose_commands, floor_robot
-from hopping_leg.hop_detection import trace_hops
 from hopping_leg.io import versions
 from hopping_leg.robot import TIMESTEP, load_robot
 from hopping_leg.sim import Simulator
@@ -31,7 +31,7 @@ ENGINES: dict[Engine, Callable[..., Simulator]] = {
     "PyBullet": PyBulletSimulator,
 }
 
-_SECONDS, _SETTLE = 15.0, 2.0
+_SECONDS = 15.0
 
 
 @dataclass(frozen=True)
@@ -91,12 +91,10 @@ def hop(study: Engines, engine: Engine, name: str) -> list[Row]:
     legs = ENGINES[engine](robot, len(asked), rate=config.rate, timestep=study.timestep)
     controller = load_controller(name, told, other="accept")
     run = rollout(controller, config, schedule, study.seed, legs=legs)
-    start = round(_SETTLE * config.rate)
-    traces = (run.trace(leg) for leg in range(len(asked)))
-    apexes = [trace_hops(replace(t, table=t.table[start:])).apex for t in traces]
+    windows = [measure(run.trace(leg))[0] for leg in range(len(asked))]
     rows = []
     for index, command in enumerate(commands):
-        found = np.concatenate(apexes[index * study.seeds : (index + 1) * study.seeds])
+        found = pooled_apexes(windows[index * study.seeds : (index + 1) * study.seeds])
         rows.append({
             "engine": engine,
             "controller": name,

@@ -14,15 +14,12 @@ from hopping_leg.cli.options import JsonFile, at_least, mm, say, show_table
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.hop_detection import find_hops
+from hopping_leg.evaluate.metrics import measure
 from hopping_leg.robot import Robot, load_robot
 from studies.shared import Row
 
 TOLERANCE = 0.5e-3
 """By how much halving the step may move a median or a standard deviation, m."""
-
-SETTLING = 2.0
-"""Beginning of every run that is left out, s."""
 
 
 @dataclass(frozen=True)
@@ -88,11 +85,7 @@ class PhysicsStep:
         ticks = round(self.duration * setup.rate)
         controller = load_controller(name, robot)
         run = rollout(controller, setup, np.tile(commands, (ticks, 1)), self.seed)
-        columns = (run.data[c].T for c in ("height_m", "height_rate_m_s", "foot_clearance_m"))
-        apexes = []
-        for leg in zip(*columns, strict=True):
-            hops = find_hops(*leg)
-            apexes.append(hops.apex[run.time[hops.tick] >= SETTLING])
+        apexes = [measure(run.trace(leg))[0].apex for leg in range(len(commands))]
         rows = []
         for number, command in enumerate(self.commands):
             mine = apexes[number * self.repeats : (number + 1) * self.repeats]
