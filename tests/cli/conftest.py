@@ -12,7 +12,7 @@ def spring(monkeypatch):
     def load(names, robot, rate):
         return [Entry(name, Spring(robot, (0.29, 0.31))) for name in names]
 
-    monkeypatch.setattr("hopping_leg.evaluate.entries.load_entries", load)
+    monkeypatch.setattr("hopping_leg.evaluate.runner.load_entries", load)
 
 
 @pytest.fixture

@@ -4,8 +4,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from hopping_leg.evaluate.aggregation import pool_group, summarise
 from hopping_leg.evaluate.metrics import measure, skipped_in_run
+from hopping_leg.evaluate.summary import pool_group, summarise
 from hopping_leg.trace import COLUMNS, Trace
 
 RATE = 200.0

@@ -9,10 +9,9 @@ import pytest
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import Entry, entries, evaluate
-from hopping_leg.evaluate.entries import load_entries
+from hopping_leg.evaluate import Entry, evaluate, runner
 from hopping_leg.evaluate.robustness import make_suite, run_suite
-from hopping_leg.evaluate.runner import _note_stopped
+from hopping_leg.evaluate.runner import _note_stopped, load_entries
 from hopping_leg.evaluate.trials import (
     COMMANDS,
     floor_robot,
@@ -156,9 +155,9 @@ def folder(tmp_path, monkeypatch):
     """Two policy files; the training seed is the file's name."""
     for name in ("1.onnx", "2.onnx"):
         (tmp_path / name).touch()
-    monkeypatch.setattr(entries, "Policy", FakePolicy)
+    monkeypatch.setattr(runner, "Policy", FakePolicy)
     monkeypatch.setattr(
-        entries, "load_controller", lambda name, *_, **__: FakePolicy(int(Path(name).stem))
+        runner, "load_controller", lambda name, *_, **__: FakePolicy(int(Path(name).stem))
     )
     return tmp_path
 

@@ -64,7 +64,7 @@ class Conditions:
         """Return the controllers and how they are rolled out; a wrong option is a UsageError."""
         from hopping_leg.controllers import RolloutConfig
         from hopping_leg.controllers.registry import robot_of
-        from hopping_leg.evaluate.entries import load_entries
+        from hopping_leg.evaluate.runner import load_entries
         from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 
         options.at_least(0, seed=self.seed)

@@ -47,7 +47,7 @@ def run(args: Report) -> None:
 def _draw(args: Report) -> None:
     from hopping_leg import figure_style
     from hopping_leg.colours import controller_colours
-    from hopping_leg.evaluate import aggregation, report, trials
+    from hopping_leg.evaluate import report, result, trials
 
     if not args.traces:
         raise errors.UsageError(
@@ -55,9 +55,7 @@ def _draw(args: Report) -> None:
         )
     runs = [trials.load_run(_trace(path)) for path in args.traces]
     controllers = list(dict.fromkeys(run.controller for run in runs))
-    for picture in report.draw_report_figures(
-        aggregation.tabulate(runs, controllers, seed=0), runs
-    ):
+    for picture in report.draw_report_figures(result.tabulate(runs, controllers, seed=0), runs):
         path = args.out / f"{picture.name}.{args.format}"
         io.write_atomically(path, figure_style.ENCODERS[args.format](picture.figure))
         say(f"{picture.title}: {path}")

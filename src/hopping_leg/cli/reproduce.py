@@ -207,7 +207,7 @@ def _hop(
     from hopping_leg.controllers import RolloutConfig
     from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller
     from hopping_leg.evaluate import runner
-    from hopping_leg.evaluate.entries import Entry
+    from hopping_leg.evaluate.runner import Entry
     from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 
     told: dict[str, tuple[str | Path, str]] = {**policies}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.evaluate import motor_load, result, statistics
+from hopping_leg.evaluate import motor_load, statistics
 from hopping_leg.hop_detection import COLUMNS, FLIGHT_CLEARANCE, measure_hops, trace_hops
 from hopping_leg.robot.parameters import JOINTS
 from hopping_leg.trace import Trace
@@ -135,7 +135,24 @@ ESTIMATED_APEX = "estimated_apex_m"
 """Trace column: height of the last apex as estimated after its flight, m."""
 
 
-def judge_estimator(controller: str, traces: Sequence[Trace]) -> result.Estimator | None:
+@dataclass(frozen=True)
+class Estimator:
+    """Estimated minus true height of a controller that estimates it, all runs pooled."""
+
+    controller: str
+    flight_bias_m: float
+    """Mean over ticks in flight."""
+    flight_std_m: float
+    stance_bias_m: float
+    stance_std_m: float
+    apex_bias_m: float
+    """Mean over hops of the apex estimated after landing minus the true one."""
+    apex_std_m: float
+    hops: int
+    """Hops that the controller noticed."""
+
+
+def judge_estimator(controller: str, traces: Sequence[Trace]) -> Estimator | None:
     """Compare estimated with true heights after the first 2 s; None where there is no estimate."""
     flight, stance, apex = [], [], []
     for trace in traces:
@@ -154,7 +171,7 @@ def judge_estimator(controller: str, traces: Sequence[Trace]) -> result.Estimato
         for name, errors in found.items()
         for what, statistic in (("bias", np.mean), ("std", np.std))
     }
-    return result.Estimator(controller, hops=sum(map(len, apex)), **numbers)
+    return Estimator(controller, hops=sum(map(len, apex)), **numbers)
 
 
 def apex_errors(trace: Trace) -> Array:

@@ -1,7 +1,7 @@
 """The report: figures of an evaluation, and one HTML page that holds all and needs nothing."""
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from statistics import median_high
@@ -12,10 +12,11 @@ from matplotlib.figure import Figure
 from hopping_leg.colours import controller_colours
 from hopping_leg.evaluate import figures, runner, tables
 from hopping_leg.evaluate.result import Evaluation
-from hopping_leg.evaluate.trials import Run
+from hopping_leg.evaluate.trials import KINDS, Run
 from hopping_leg.evaluate.video import Video, fixed_traces, render_hops
 from hopping_leg.html_page import data_uri, page_template, svg_uri
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.trace import Trace
 
 
 @dataclass(frozen=True)
@@ -54,50 +55,45 @@ _OVER_TIME = {
 
 def draw_report_figures(evaluation: Evaluation, runs: Sequence[Run]) -> list[Picture]:
     """Draw every figure that the runs allow; the first says most."""
-    return list(_figures(evaluation, runs))
-
-
-def _figures(evaluation: Evaluation, runs: Sequence[Run]) -> Iterator[Picture]:
     order = {name: place for place, name in enumerate(evaluation.controllers)}
     runs = sorted(runs, key=lambda run: (order.get(run.controller, 0), run.repeat))
-
-    def of_kind(*kinds: str) -> list[Run]:
-        return [run for run in runs if run.trial.kind in kinds]
-
+    kinds = {kind: [run for run in runs if run.trial.kind == kind] for kind in KINDS}
     examples = _examples(runs)
-    shown = {kind: _first(of_kind(kind)) for kind in ("staircase", "sequence") if of_kind(kind)}
+    shown = {kind: _first(kinds[kind]) for kind in ("staircase", "sequence") if kinds[kind]}
+    pictures = []
     for kind, found in list(shown.items())[:1]:
         title = f"Apexes, {_OVER_TIME[kind][0].lower()}"
         caption = "Apexes with the foot off the ground, first seed. The command is their aim."
-        yield Picture("apexes", title, caption, figures.draw_apexes(_traces(found)), found)
-    if any(row.hops for row in evaluation.summary):
-        yield Picture(
-            "distributions",
-            "Distributions of the apex",
-            "Every hop of the fixed trials and the sequence, pooled as in the paper's Fig. 9."
-            " Coloured lines: medians; grey lines: commands.",
-            figures.draw_distributions(evaluation),
-            of_kind("fixed", "sequence"),
+        pictures.append(
+            Picture("apexes", title, caption, figures.draw_apexes(_traces(found)), found)
         )
+    if any(row.hops for row in evaluation.summary):
+        caption = (
+            "Every hop of the fixed trials and the sequence, pooled as in the paper's Fig. 9."
+            " Coloured lines: medians; grey lines: commands."
+        )
+        figure, drawn = figures.draw_distributions(evaluation), kinds["fixed"] + kinds["sequence"]
+        title = "Distributions of the apex"
+        pictures.append(Picture("distributions", title, caption, figure, drawn))
     if evaluation.ladder:
         caption = "Commands between and beyond the trained ones, 15 s each."
-        figure = figures.draw_ladder(evaluation)
-        yield Picture("ladder", "Ladder of commands", caption, figure, of_kind("ladder"))
+        figure, title = figures.draw_ladder(evaluation), "Ladder of commands"
+        pictures.append(Picture("ladder", title, caption, figure, kinds["ladder"]))
     for kind, found in (shown or {"heights": examples}).items():
         if found:
             title, when = _OVER_TIME[kind]
             caption = f"Base height {when}. Dots: apexes in flight; black: their median."
-            yield Picture(kind, title, caption, figures.draw_heights(_traces(found)), found)
+            figure = figures.draw_heights(_traces(found))
+            pictures.append(Picture(kind, title, caption, figure, found))
     if examples:
-        yield Picture(
-            "phase-space",
-            "Knee torque in phase space",
+        caption = (
             "Torque asked of the knee at every configuration met in 10 s of"
             f" {examples[0].trial.name}, as in the paper's Fig. 6. Line: one phase from its start"
-            " (circle) to its end (diamond).",
-            figures.draw_phase_space(_traces(examples)),
-            examples,
+            " (circle) to its end (diamond)."
         )
+        figure, title = figures.draw_phase_space(_traces(examples)), "Knee torque in phase space"
+        pictures.append(Picture("phase-space", title, caption, figure, examples))
+    return pictures
 
 
 def _first(runs: Iterable[Run]) -> list[Run]:
@@ -108,7 +104,7 @@ def _first(runs: Iterable[Run]) -> list[Run]:
     return list(found.values())
 
 
-def _traces(runs: Sequence[Run]) -> dict[str, Any]:
+def _traces(runs: Sequence[Run]) -> dict[str, Trace]:
     return {run.controller: run.trace for run in runs}
 
 

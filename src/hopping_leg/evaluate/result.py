@@ -1,62 +1,20 @@
-"""The numbers of an evaluation, as typed records and as JSON."""
+"""The numbers of an evaluation: recorded runs, measured and arranged; as JSON."""
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from hopping_leg.evaluate.motor_load import MotorLoad
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.evaluate import metrics, statistics, trials
+from hopping_leg.evaluate.summary import Group, Summary, summarise
 from hopping_leg.io import plain
+from hopping_leg.robot import Robot
 
 SCHEMA = 2
 """Version of the JSON, raised when a name changes its meaning."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class HopStatistics:
-    """One controller at one command, hops of all its runs pooled; 95 % intervals resample runs."""
-
-    controller: str
-    robot: str
-    command_m: float
-    median_error_m: float
-    """Median of apex minus command, misses included."""
-    median_error_low_m: float
-    median_error_high_m: float
-    median_abs_error_m: float
-    """Median of |apex - command|, misses included."""
-    mean_abs_error_m: float
-    """Mean of |apex - command|, misses included."""
-    mean_abs_error_low_m: float
-    mean_abs_error_high_m: float
-    std_m: float
-    """Hop-to-hop standard deviation of the apex."""
-    std_low_m: float
-    std_high_m: float
-    iqr_m: float
-    """Interquartile range of the apex."""
-    hops: int
-    """In-flight apexes counted."""
-    skipped_hops: int
-    stance_bounces: int
-    hop_rate_hz: float
-    flight_fraction: float
-    min_base_height_m: float
-    max_sink_m: float
-    body_contacts: int
-    """Times base or knee touched the ground."""
-    base_contacts: int
-    knee_contacts: int
-    peak_hip_torque_nm: float
-    peak_knee_torque_nm: float
-    measured_s: float
-    """Time in which hops were counted."""
-    runs: int
-    missed_runs: int
-    """Runs without a hop: their errors are misses, standing height minus command."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Summary(MotorLoad, HopStatistics):
-    """How one controller hops at one command, and what that is for the motors."""
 
 
 @dataclass(frozen=True)
@@ -76,43 +34,6 @@ class Staircase:
 
 
 @dataclass(frozen=True)
-class Estimator:
-    """Estimated minus true height of a controller that estimates it, all runs pooled."""
-
-    controller: str
-    flight_bias_m: float
-    """Mean over ticks in flight."""
-    flight_std_m: float
-    stance_bias_m: float
-    stance_std_m: float
-    apex_bias_m: float
-    """Mean over hops of the apex estimated after landing minus the true one."""
-    apex_std_m: float
-    hops: int
-    """Hops that the controller noticed."""
-
-
-@dataclass(frozen=True)
-class Group:
-    """Several policies of one recipe, trained with different seeds, at one command."""
-
-    group: str
-    command_m: float
-    policies: int
-    motionless: int
-    """Policies that never hopped; their errors are misses, standing height minus command."""
-    median_error_m: float
-    """Median over policies of each policy's median error."""
-    median_error_low_m: float
-    """Lower end of its 95 % bootstrap interval, policies resampled."""
-    median_error_high_m: float
-    worst_abs_error_m: float
-    median_std_m: float
-    skipped_hops: int
-    body_contacts: int
-
-
-@dataclass(frozen=True)
 class Evaluation:
     """Everything measured, without the traces."""
 
@@ -126,7 +47,7 @@ class Evaluation:
     """Neighbouring commands compared: controller, neighbours."""
     distributions: list[dict[str, Any]]
     """Apexes behind ``summary``: controller, command_m, apexes_m."""
-    estimators: list[Estimator] = field(default_factory=list)
+    estimators: list[metrics.Estimator] = field(default_factory=list)
     groups: list[Group] = field(default_factory=list)
     conditions: dict[str, Any] = field(default_factory=dict)
     """Robot, digest, floor, disturbance, seeds, steps, rates."""
@@ -151,3 +72,95 @@ class Evaluation:
     def to_json(self) -> dict[str, Any]:
         """Return plain values; numbers that do not exist are None."""
         return {"schema": SCHEMA, **plain(asdict(self))}
+
+
+def tabulate(
+    runs: Sequence[trials.Run], controllers: Sequence[str], seed: int, robot: Robot | None = None
+) -> Evaluation:
+    """Measure runs and arrange the numbers; conditions, versions and notes stay empty.
+
+    Args:
+        runs: Runs of all controllers.
+        controllers: Their names in the order of the rows.
+        seed: Seed of the bootstrap.
+        robot: The leg of all runs; without it nothing is told of its motors.
+    """
+    own = {name: [run for run in runs if run.controller == name] for name in controllers}
+    measured = {
+        name: [(run, window) for run in own[name] for window in metrics.measure(run.trace)]
+        for name in controllers
+    }
+
+    def windows(name: str, *kinds: str) -> dict[float, list[metrics.HopWindow]]:
+        """Return a controller's windows in trials of some kinds, by rising command."""
+        found = [w for kind in kinds for run, w in measured[name] if run.trial.kind == kind]
+        commands = sorted({w.command for w in found})
+        return {c: [w for w in found if w.command == c] for c in commands}
+
+    def rows(*kinds: str) -> list[Summary]:
+        return [
+            summarise(name, command, group, seed, robot)
+            for name in controllers
+            for command, group in windows(name, *kinds).items()
+        ]
+
+    stairs = {n: [run for run in own[n] if run.trial.kind == "staircase"] for n in controllers}
+    return Evaluation(
+        summary=rows("fixed", "sequence"),
+        sequence=rows("sequence"),
+        ladder=rows("ladder"),
+        staircase=[_staircase(name, found) for name, found in stairs.items() if found],
+        neighbours=[
+            {"controller": name, "neighbours": _compare(measured[name], seed)}
+            for name in controllers
+        ],
+        distributions=[
+            {
+                "controller": name,
+                "command_m": command,
+                "apexes_m": np.round(metrics.pooled_apexes(group), 5).tolist(),
+            }
+            for name in controllers
+            for command, group in windows(name, "fixed", "sequence").items()
+        ],
+        estimators=[
+            found
+            for name in controllers
+            if (found := metrics.judge_estimator(name, [run.trace for run in own[name]]))
+        ],
+    )
+
+
+def _compare(
+    measured: Sequence[tuple[trials.Run, metrics.HopWindow]], seed: int
+) -> list[statistics.Neighbours]:
+    """Compare neighbouring commands: within a run that has both, or of runs of equal number."""
+    apexes: dict[float, dict[tuple[str, int], Array]] = {}
+    for run, window in measured:
+        if run.trial.kind in ("fixed", "sequence"):
+            key, found = (run.trial.kind, run.repeat), apexes.setdefault(window.command, {})
+            found[key] = np.concatenate([found.get(key, np.empty(0)), window.apex])
+    rows = []
+    for low, high in itertools.pairwise(sorted(apexes)):
+        pairs = [key for key in apexes[low] if key in apexes[high]]
+        lower, upper = ([apexes[command][key] for key in pairs] for command in (low, high))
+        rows.append(statistics.compare(low, lower, high, upper, seed))
+    return rows
+
+
+def _staircase(label: str, runs: Sequence[trials.Run]) -> Staircase:
+    measured = [metrics.measure(run.trace) for run in runs]
+    steps = [list(group) for group in zip(*measured, strict=True)]
+    commands = [step[0].command for step in steps]
+    errors = [np.median(np.concatenate(metrics.errors_of(step))) for step in steps]
+    medians, hopped = np.add(commands, errors), all(len(metrics.pooled_apexes(s)) for s in steps)
+    per_run = np.array([[statistics.of(np.median, w.apex) for w in run] for run in measured])
+    return Staircase(
+        controller=label,
+        commands_m=commands,
+        median_apexes_m=medians.tolist(),
+        monotone=bool((np.diff(medians) > 0).all() and hopped),
+        monotone_runs=int((np.diff(per_run, axis=1) > 0).all(axis=1).sum()),
+        runs=len(runs),
+        skipped_hops=sum(metrics.skipped_in_run(run.trace) for run in runs),
+    )

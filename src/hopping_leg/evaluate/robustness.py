@@ -18,8 +18,8 @@ from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.controllers.rollout import Perturbation
 from hopping_leg.evaluate import metrics, runner, statistics, trials
-from hopping_leg.evaluate.entries import Entry, check_entries
 from hopping_leg.evaluate.robustness_axes import AXES, NOMINAL, Axis, Case, axes_named
+from hopping_leg.evaluate.runner import Entry, check_entries
 
 SCHEMA = 2
 """Version of the JSON, raised when a name changes its meaning."""
@@ -86,8 +86,7 @@ def make_suite(
     Raises:
         UsageError: There is no such axis, or a command is out of reach.
     """
-    trials.check_repeats(repeats)
-    chosen = trials.choose_commands(setup.robot, commands)
+    chosen = trials.choose_commands(setup.robot, commands, repeats)
     return Suite(setup, axes_named(axes), chosen, repeats, seed, seconds)
 
 

@@ -1,6 +1,5 @@
 """The paper's trials (Sec. III): what is commanded when, on which floor, and runs of them."""
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -58,12 +57,16 @@ def paper_trials(robot: Robot, commands: Sequence[float] | None = None) -> list[
     return trials
 
 
-def choose_commands(robot: Robot, commands: Sequence[float] | None) -> tuple[float, ...]:
+def choose_commands(
+    robot: Robot, commands: Sequence[float] | None, repeats: int = 1
+) -> tuple[float, ...]:
     """Return rising heights to hop to, m: those asked for, or the paper's scaled to the leg.
 
     Raises:
-        UsageError: No controller can make this leg hop to one of them.
+        UsageError: No controller can make this leg hop to one of them, or none hops even once.
     """
+    if repeats < 1:
+        raise errors.UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
     if commands is None:
         return scaled(COMMANDS, robot)
     low, high = command_limits(robot)
@@ -72,22 +75,12 @@ def choose_commands(robot: Robot, commands: Sequence[float] | None) -> tuple[flo
             "No commands were given; give heights in m, e.g. --commands 0.25,0.30."
         )
     for height in commands:
-        if not math.isfinite(height) or not low <= height <= high:
+        if not low <= height <= high:
             raise errors.UsageError(
                 f"A command of {height:g} m is out of reach of {robot.name}; give heights of the"
                 f" hip axis from {low:.2f} to {high:.2f} m."
             )
     return tuple(sorted(set(commands)))
-
-
-def check_repeats(repeats: int) -> None:
-    """Refuse to run nothing.
-
-    Raises:
-        UsageError: There is no realisation of noise and delay.
-    """
-    if repeats < 1:
-        raise errors.UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
 
 
 FLOORS = {"soft": "the robot's own contact", "stiff": "MuJoCo's default contact, solref 0.02 1"}
