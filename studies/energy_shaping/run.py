@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 import polars as pl
@@ -12,7 +11,7 @@ from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.cli.options import JsonFile, RobotFile, at_least, mm, show_table
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.energy_shaping import paper_energy_shaping, tuned_energy_shaping
-from hopping_leg.controllers.energy_shaping.controller import EnergyShaping
+from hopping_leg.controllers.energy_shaping.controller import EnergyShaping, LiteralEnergyShaping
 from hopping_leg.controllers.energy_shaping.virtual_leg import LegView, Phase
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.metrics import (
@@ -54,7 +53,7 @@ class Case:
     commands: Sequence[float] = COMMANDS
 
 
-class Knowing(EnergyShaping):
+class Knowing(LiteralEnergyShaping):
     """Energy shaping that the simulator tells of contact, base velocity and apexes."""
 
     def watch(self, legs: Simulator) -> None:
@@ -85,8 +84,9 @@ class Knowing(EnergyShaping):
 class Waiting(Knowing):
     """The same that also pushes until contact is lost."""
 
-    def _stretched(self, leg: LegView, liftoff: Array) -> BoolArray:
-        return (self.legs.foot_clearance() > 0) & self._settled()
+    def _lifted_off(self, leg: LegView, liftoff: Array) -> tuple[BoolArray, Array, Array]:
+        lost = (self.legs.foot_clearance() > 0) & self._settled()
+        return lost, leg.rate, np.zeros_like(leg.rate)
 
 
 def cases(robot: Robot) -> list[Case]:
@@ -100,9 +100,11 @@ def cases(robot: Robot) -> list[Case]:
     rubbing = replace(robot.rail, friction=3 * robot.rail.friction)
     others = [load_robot(name) for name in ("legv2", "legv2-paper")]
 
-    def without(name: str, gains: dict[str, float], **options: Any) -> Case:  # noqa: ANN401
-        changed = replace(tuned.gains, **gains), replace(tuned.options, **options)
-        return Case(f"tuned, {name}", EnergyShaping(robot, *changed), robot)
+    def without(name: str, gains: dict[str, float], *literal: str) -> Case:
+        """Return the tuned law with other gains, or with what the literal one does instead."""
+        methods = {method: getattr(LiteralEnergyShaping, method) for method in literal}
+        kind = type(f"Without{'_'.join(literal)}", (EnergyShaping,), methods)
+        return Case(f"tuned, {name}", kind(robot, replace(tuned.gains, **gains)), robot)
 
     raw = {"height_offset": 0.0, "height_scale": 1.0}
     joint = replace(NO_NOISE, joint_noise=noise.joint_noise)
@@ -119,10 +121,10 @@ def cases(robot: Robot) -> list[Case]:
         Case("tuned, joint noise only", tuned, robot, joint),
         Case("tuned, torque noise only", tuned, robot, torque),
         Case("tuned, delay only", tuned, robot, late),
-        without("ballistic estimate", raw, height="ballistic"),
-        without("newest sample only", {}, state="latest"),
-        without("single-sample contact", {}, contact="rate"),
-        without("lift-off on whole periods", {}, liftoff="length"),
+        without("ballistic estimate", raw, "_reached"),
+        without("newest sample only", {}, "_joints"),
+        without("single-sample contact", {}, "debounced"),
+        without("lift-off on whole periods", {}, "_pushing_share", "_lifted_off"),
         without("no pull to a leg rate", {"push_damping": 0.0}),
         without("exponent 2", {"exponent": 2.0}),
         without("exponent 1", {"exponent": 1.0}),

@@ -21,7 +21,6 @@ from hopping_leg.cli.options import JsonFile, RobotFile, command_line, say, say_
 from hopping_leg.controllers import Rollout, RolloutConfig, rollout
 from hopping_leg.controllers.energy_shaping.controller import EnergyShaping
 from hopping_leg.controllers.energy_shaping.gains import (
-    ROBUST,
     GainFile,
     ShapingGains,
     load_gains,
@@ -263,7 +262,7 @@ def evaluate(
     }
     stacked["k0"] = stacked["k0"] * np.tile(FIRST_GAINS, len(candidates) * len(commands))
     command = np.tile(np.repeat(commands, firsts), len(candidates))
-    controller = EnergyShaping(config.robot, ShapingGains(**stacked), ROBUST, rate=config.rate)
+    controller = EnergyShaping(config.robot, ShapingGains(**stacked), rate=config.rate)
     ticks = round(seconds * config.rate)
     run = rollout(controller, config, np.tile(command, (ticks, 1)), seed)
     return [

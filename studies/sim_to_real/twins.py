@@ -99,6 +99,6 @@ def disturbance_of(robot: Robot) -> NoiseAndDelay:
 def fingerprint(controller: Controller) -> str:
     """Return what distinguishes a controller from others of its name, as far as is known."""
     if isinstance(controller, EnergyShaping):
-        return repr((controller.gains, controller.options))
+        return f"{type(controller).__name__}({controller.gains})"
     named = f"{type(controller).__module__}.{type(controller).__qualname__}"
     return str(getattr(controller, "digest", named))

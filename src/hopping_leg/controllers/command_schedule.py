@@ -50,11 +50,6 @@ class CommandSchedule:
         return CommandSchedule(tuple(steps))
 
     @property
-    def heights(self) -> tuple[float, ...]:
-        """Height of each step, m."""
-        return tuple(height for height, _ in self.steps)
-
-    @property
     def seconds(self) -> float:
         """Length of all steps, s."""
         return sum(seconds for _, seconds in self.steps)
@@ -89,7 +84,7 @@ def check_schedule(schedule: CommandSchedule, valid: Range, name: str) -> None:
         UsageError: Naming the height and the range.
     """
     slack = 1e-9
-    for height in schedule.heights:
+    for height, _ in schedule.steps:
         if not valid[0] - slack <= height <= valid[1] + slack:
             raise UsageError(
                 f"A command of {height:g} m is outside of what {name} can be asked for; give"

@@ -66,9 +66,8 @@ class Fallback:
             torque = self.policy.act(measurement)
         except Exception as error:  # the other controller goes on, whatever it was
             return unknown, str(error).rstrip(".") or type(error).__name__
-        return torque, "" if np.isfinite(
-            torque
-        ).all() else "it asked for a torque that is no number"
+        wrong = "" if np.isfinite(torque).all() else "it asked for a torque that is no number"
+        return torque, wrong
 
 
 def with_fallback(controller: Controller, robot: Robot) -> Controller:

@@ -5,8 +5,8 @@ and ``internals`` may be left out, or controls one leg, as RealAIGym's users wri
 
     get_control_output(meas_pos, meas_vel, meas_tau, meas_time)   # (2,), (2,), (2,), s
 
-which returns the torques of hip and knee, N m, (2,). Whatever it does, the caller gets torques or
-one sentence that names it.
+which returns the torques of hip and knee, N m, (2,); its attribute ``desired_height`` is the
+commanded apex height, m. Whatever it does, the caller gets torques or a sentence that names it.
 """
 
 import contextlib
@@ -29,7 +29,6 @@ from hopping_leg.sim.channel import Measurement
 from hopping_leg.trace import COLUMNS
 
 METHOD = "get_control_output"  # of a controller of one leg
-COMMAND = "desired_height"  # its attribute that holds the commanded apex height, m
 
 
 class SingleLeg:
@@ -47,7 +46,7 @@ class SingleLeg:
         """Return what each leg's controller answers; the torque shown is the last answer."""
         time, answers = self._tick * self._period, []
         for i, leg in enumerate(self._legs):
-            setattr(leg, COMMAND, float(measurement.command[i, 0]))
+            leg.desired_height = float(measurement.command[i, 0])
             q, qd = measurement.q[i, 0].copy(), measurement.qd[i, 0].copy()
             answers.append(leg.get_control_output(q, qd, self._torque[i].copy(), time))
         self._torque, self._tick = np.array(answers, np.float64), self._tick + 1

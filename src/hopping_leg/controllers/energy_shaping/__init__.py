@@ -1,9 +1,7 @@
 """Energy shaping, the paper's baseline: the controllers that are shipped and compared."""
 
-from hopping_leg.controllers.energy_shaping.controller import EnergyShaping
+from hopping_leg.controllers.energy_shaping.controller import EnergyShaping, LiteralEnergyShaping
 from hopping_leg.controllers.energy_shaping.gains import (
-    LITERAL,
-    ROBUST,
     TUNED,
     ShapingGains,
     load_gains,
@@ -22,10 +20,10 @@ def tuned_energy_shaping(
     """
     found = load_gains(gains, robot)
     scaled = scale_gains(found.gains, load_robot(found.robot), robot)
-    return EnergyShaping(robot, scaled, ROBUST, rate=rate, name=gains)
+    return EnergyShaping(robot, scaled, rate=rate, name=gains)
 
 
-def paper_energy_shaping(robot: Robot, *, rate: float = CONTROL_RATE) -> EnergyShaping:
+def paper_energy_shaping(robot: Robot, *, rate: float = CONTROL_RATE) -> LiteralEnergyShaping:
     """Return the paper's law and gains with nothing added."""
     gains = scale_gains(ShapingGains(), load_robot(load_gains().robot), robot)
-    return EnergyShaping(robot, gains, LITERAL, rate=rate, name="energy-shaping-literal")
+    return LiteralEnergyShaping(robot, gains, rate=rate, name="energy-shaping-literal")

@@ -6,28 +6,47 @@ Paper, "Energy Shaping". Each push presses with k F_f; each hop corrects k by th
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.controllers.energy_shaping import equations, virtual_leg
-from hopping_leg.controllers.energy_shaping.gains import Gain, ShapingGains, ShapingOptions
+from hopping_leg.controllers.energy_shaping import equations
+from hopping_leg.controllers.energy_shaping.gains import Gain, ShapingGains
+from hopping_leg.controllers.energy_shaping.virtual_leg import (
+    BRAKE_LIMIT,
+    FLIGHT_LIMIT,
+    PUSH_LIMIT,
+    LegView,
+    Phase,
+    Phases,
+    TouchdownDetector,
+    flight_torque,
+    foot_force_torque,
+    retraction,
+    view_leg,
+)
 from hopping_leg.controllers.sample_history import DatedObserver
 from hopping_leg.robot import Robot, kinematics
 from hopping_leg.sim import CONTROL_RATE, Measurement
 
 
 class EnergyShaping:
-    """The baseline controller, at a control rate in Hz; it measures nothing but its joints."""
+    """The baseline controller, at a control rate in Hz; it measures nothing but its joints.
+
+    Joint states are filtered from the dated history of samples, touchdown is the median of three
+    leg rates, a push ends within a control period, the apex follows from the time in the air, and
+    the gain is judged by the command in force at its push.
+    """
+
+    debounced = True
+    """Whether touchdown is a median."""
 
     def __init__(
         self,
         robot: Robot,
         gains: ShapingGains | None = None,
-        options: ShapingOptions | None = None,
         *,
         rate: float = CONTROL_RATE,
         name: str = "energy-shaping",
     ) -> None:
         self.robot, self.name, self.period = robot, name, 1 / rate
         self.gains = gains or ShapingGains()
-        self.options = options or ShapingOptions()
         thigh, shank = robot.thigh.length, robot.shank.length
         bent = 2 * thigh * shank * np.cos(robot.knee.upper)
         self._longest = float(np.sqrt(thigh**2 + shank**2 + bent))
@@ -36,9 +55,8 @@ class EnergyShaping:
         """Forget everything; the legs stand and push next."""
         self._observer = DatedObserver(self.period, self.gains.position_pull)
         self._observer.reset(count)
-        debounced = self.options.contact == "debounced"
-        self._detector = virtual_leg.TouchdownDetector(self.robot, count, debounced=debounced)
-        self._phases = virtual_leg.Phases(count)
+        self._detector = TouchdownDetector(self.robot, count, debounced=self.debounced)
+        self._phases = Phases(count)
         self._k_ratio = np.ones(count)
         self._length_0 = np.full(count, np.nan)
         self._pushed = np.full(count, np.nan)
@@ -52,10 +70,7 @@ class EnergyShaping:
     def act(self, measurement: Measurement) -> Array:
         """Return joint torques, N m, (n, 2)."""
         command = measurement.command[:, 0]
-        joints = measurement.q[:, 0], measurement.qd[:, 0]
-        if self.options.state == "dated":
-            joints = self._observer.update(measurement)
-        leg = virtual_leg.view_leg(self.robot, *joints)
+        leg = view_leg(self.robot, *self._joints(measurement))
         self._length_0 = np.where(np.isnan(self._length_0), leg.length, self._length_0)
         self._pushed = np.where(np.isnan(self._pushed), command, self._pushed)
         self._phases.tick(self.period)
@@ -65,16 +80,18 @@ class EnergyShaping:
         self._end_touchdown(leg, command)
         self._end_push(leg, liftoff)
         target = kinematics.joint_angles(self.robot, np.stack([landing, 0 * landing], axis=-1))
-        posture, posture_rate = virtual_leg.retraction(
-            self._liftoff_q, target, self._phases.clock, gains.retract_time
-        )
-        flying = virtual_leg.flight_torque(gains, leg, posture, posture_rate)
+        clock = self._phases.clock
+        posture, posture_rate = retraction(self._liftoff_q, target, clock, gains.retract_time)
+        flying = flight_torque(gains, leg, posture, posture_rate)
         self._end_flight(leg, posture_rate, flying, command)
         self._estimate_height(leg)
         push = self._force(leg, command, liftoff, landing)
         side = -gains.kp_y * leg.y - gains.kd_y * leg.y_rate
-        pressing = virtual_leg.foot_force_torque(self.robot, leg.q, push, side)
-        self._share, self._rate = self._pressing_share(leg, liftoff), leg.rate
+        pressing = foot_force_torque(self.robot, leg.q, push, side)
+        share = np.where(self._phases.are(Phase.FLIGHT), 0.0, 1.0)
+        pushes = self._phases.are(Phase.LIFTOFF)
+        self._share = np.where(pushes, self._pushing_share(leg, liftoff), share)
+        self._rate = leg.rate
         return flying + self._share[:, None] * (pressing - flying)
 
     def internals(self) -> dict[str, Array]:
@@ -96,9 +113,7 @@ class EnergyShaping:
         gains = self.gains
         return (gains.k0 + gains.k0_slope * (command - gains.reference)) * self._k_ratio
 
-    def _force(
-        self, leg: virtual_leg.LegView, command: Array, liftoff: Array, landing: Array
-    ) -> Array:
+    def _force(self, leg: LegView, command: Array, liftoff: Array, landing: Array) -> Array:
         gains = self.gains
         final = gains.push_rate + gains.push_rate_slope * (command - gains.reference)
         intended = equations.intended_rate(leg.length, self._length_0, liftoff, final)
@@ -106,47 +121,28 @@ class EnergyShaping:
         thrust = self._gain(command) * forward + gains.push_damping * (intended - leg.rate)
         brake = gains.touchdown_stiffness * (landing - leg.length)
         brake = brake - gains.touchdown_damping * leg.rate
-        return np.where(self._phases.are(virtual_leg.Phase.LIFTOFF), thrust, brake)
+        return np.where(self._phases.are(Phase.LIFTOFF), thrust, brake)
 
-    def _pressing_share(self, leg: virtual_leg.LegView, liftoff: Array) -> Array:
-        share = np.where(self._phases.are(virtual_leg.Phase.FLIGHT), 0.0, 1.0)
-        if self.options.liftoff == "timed":
-            until = equations.share_of_period(leg.length, leg.rate, liftoff, self.period)
-            share = np.where(self._phases.are(virtual_leg.Phase.LIFTOFF), until, share)
-        return share
-
-    def _end_push(self, leg: virtual_leg.LegView, liftoff: Array) -> None:
-        clock, rate, since = self._phases.clock, leg.rate, np.zeros_like(leg.rate)
-        if self.options.liftoff == "timed":
-            done, rate, since = self._share < 1, self._rate, (1 - self._share) * self.period
-        else:
-            done = self._stretched(leg, liftoff)
-        who = self._phases.are(virtual_leg.Phase.LIFTOFF) & (
-            done | (clock > virtual_leg.PUSH_LIMIT)
-        )
+    def _end_push(self, leg: LegView, liftoff: Array) -> None:
+        done, rate, since = self._lifted_off(leg, liftoff)
+        who = self._phases.are(Phase.LIFTOFF) & (done | (self._phases.clock > PUSH_LIMIT))
         self._liftoff_height = np.where(who, leg.stand, self._liftoff_height)
         self._liftoff_rate = np.where(who, rate, self._liftoff_rate)
         self._liftoff_q = np.where(who[:, None], leg.q, self._liftoff_q)
-        self._phases.enter(who, virtual_leg.Phase.FLIGHT, since)
+        self._phases.enter(who, Phase.FLIGHT, since)
 
-    def _end_flight(
-        self, leg: virtual_leg.LegView, posture_rate: Array, flying: Array, command: Array
-    ) -> None:
+    def _end_flight(self, leg: LegView, posture_rate: Array, flying: Array, command: Array) -> None:
         gains, clock = self.gains, self._phases.clock
         shortest = gains.flight_min + gains.flight_min_slope * (command - gains.reference)
         touched = self._touched(leg, posture_rate, flying, shortest)
-        who = self._phases.are(virtual_leg.Phase.FLIGHT) & (
-            touched | (clock > virtual_leg.FLIGHT_LIMIT)
-        )
+        who = self._phases.are(Phase.FLIGHT) & (touched | (clock > FLIGHT_LIMIT))
         if who.any():  # a touchdown that nobody noticed came before contact was believed
             too_short = np.minimum(clock, shortest)
             self._judge_hop(who, leg, command, np.where(touched, clock, too_short))
-        self._phases.enter(who, virtual_leg.Phase.TOUCHDOWN)
+        self._phases.enter(who, Phase.TOUCHDOWN)
 
-    def _judge_hop(
-        self, who: BoolArray, leg: virtual_leg.LegView, command: Array, airborne: Array
-    ) -> None:
-        gains, options = self.gains, self.options
+    def _judge_hop(self, who: BoolArray, leg: LegView, command: Array, airborne: Array) -> None:
+        gains = self.gains
         airborne = np.maximum(airborne, self.period)
         ballistic = equations.ballistic_apex(self._liftoff_height, self._liftoff_rate)
         timed = equations.flight_time_apex(self._liftoff_height, leg.stand, airborne)
@@ -154,40 +150,69 @@ class EnergyShaping:
         lean = raw - gains.reference
         apex = gains.reference + gains.height_offset + gains.height_scale * lean
         self._apex = np.where(who, np.stack([apex, ballistic, timed]), self._apex)
-        desired = self._pushed if options.desired == "pushed" else command
-        gain = equations.updated_gain(self._k_ratio, desired, apex, gains.exponent)
+        gain = equations.updated_gain(self._k_ratio, self._desired(command), apex, gains.exponent)
         self._k_ratio = np.where(who, gain, self._k_ratio)
 
-    def _end_touchdown(self, leg: virtual_leg.LegView, command: Array) -> None:
+    def _end_touchdown(self, leg: LegView, command: Array) -> None:
         clock = self._phases.clock
         turned = (self._braked_rate(leg) >= 0) & (clock > 2 * self.period)
-        who = self._phases.are(virtual_leg.Phase.TOUCHDOWN) & (
-            turned | (clock > virtual_leg.BRAKE_LIMIT)
-        )
+        who = self._phases.are(Phase.TOUCHDOWN) & (turned | (clock > BRAKE_LIMIT))
         self._length_0 = np.where(who, leg.length, self._length_0)
         self._pushed = np.where(who, command, self._pushed)
-        self._phases.enter(who, virtual_leg.Phase.LIFTOFF)
+        self._phases.enter(who, Phase.LIFTOFF)
 
-    def _estimate_height(self, leg: virtual_leg.LegView) -> None:
-        flying = equations.ballistic_height(
-            self._liftoff_height, self._liftoff_rate, self._phases.clock
-        )
-        self._height = np.where(self._phases.are(virtual_leg.Phase.FLIGHT), flying, leg.stand)
+    def _estimate_height(self, leg: LegView) -> None:
+        start, clock = self._liftoff_height, self._phases.clock
+        flying = equations.ballistic_height(start, self._liftoff_rate, clock)
+        self._height = np.where(self._phases.are(Phase.FLIGHT), flying, leg.stand)
 
-    # What a study asks the simulator instead.
+    # What the paper's own law, or a study that asks the simulator, does otherwise.
 
-    def _stretched(self, leg: virtual_leg.LegView, liftoff: Array) -> BoolArray:
-        stretched: BoolArray = leg.length >= liftoff
-        return stretched
+    def _joints(self, measurement: Measurement) -> tuple[Array, Array]:
+        return self._observer.update(measurement)
 
-    def _touched(
-        self, leg: virtual_leg.LegView, planned: Array, torque: Array, shortest: Array
-    ) -> BoolArray:
+    def _pushing_share(self, leg: LegView, liftoff: Array) -> Array:
+        """Return for how much of the coming control period a leg still pushes, 0 to 1, (n,)."""
+        return equations.share_of_period(leg.length, leg.rate, liftoff, self.period)
+
+    def _lifted_off(self, leg: LegView, liftoff: Array) -> tuple[BoolArray, Array, Array]:
+        """Return who ends its push, the leg rate with which it did, m/s, and since when, s."""
+        return self._share < 1, self._rate, (1 - self._share) * self.period
+
+    def _touched(self, leg: LegView, planned: Array, torque: Array, shortest: Array) -> BoolArray:
         pushed = self._detector.update(leg, planned, torque, self.gains)
         return pushed & (self._phases.clock > shortest)
 
-    def _braked_rate(self, leg: virtual_leg.LegView) -> Array:
+    def _braked_rate(self, leg: LegView) -> Array:
         return leg.rate
 
     def _reached(self, ballistic: Array, timed: Array) -> Array:
-        return timed if self.options.height == "flight_time" else ballistic
+        return timed
+
+    def _desired(self, command: Array) -> Array:
+        return self._pushed
+
+
+class LiteralEnergyShaping(EnergyShaping):
+    """The paper's description, as printed.
+
+    The newest sample counts, touchdown is one leg rate, pushes last whole control periods, the apex
+    is that of the speed at lift-off, and E_d that of the present command.
+    """
+
+    debounced = False
+
+    def _joints(self, measurement: Measurement) -> tuple[Array, Array]:
+        return measurement.q[:, 0], measurement.qd[:, 0]
+
+    def _pushing_share(self, leg: LegView, liftoff: Array) -> Array:
+        return np.ones_like(leg.length)
+
+    def _lifted_off(self, leg: LegView, liftoff: Array) -> tuple[BoolArray, Array, Array]:
+        return leg.length >= liftoff, leg.rate, np.zeros_like(leg.rate)
+
+    def _reached(self, ballistic: Array, timed: Array) -> Array:
+        return ballistic
+
+    def _desired(self, command: Array) -> Array:
+        return command

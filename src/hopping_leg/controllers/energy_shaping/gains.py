@@ -1,4 +1,4 @@
-"""Gains and options of energy shaping, the defaults the paper's where it gives any; gain files.
+"""Gains of energy shaping, the defaults the paper's where it gives any; gain files.
 
 A gain file is one TOML per tuned set, beside the leg it was found on.
 """
@@ -6,7 +6,7 @@ A gain file is one TOML per tuned set, beside the leg it was found on.
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -80,28 +80,6 @@ class ShapingGains:
     reference: Gain = 0.3
     """Command about which the affine gains are written, m."""
 
-
-@dataclass(frozen=True)
-class ShapingOptions:
-    """Readings of what the paper leaves open."""
-
-    state: Literal["latest", "dated"] = "latest"
-    """Joint state: the newest sample, or a filter over the dated history of samples."""
-    contact: Literal["rate", "debounced"] = "rate"
-    """Touchdown: one leg rate, or the median of three."""
-    liftoff: Literal["length", "timed"] = "length"
-    """End of the push: at a leg length, or there even within a control period."""
-    height: Literal["ballistic", "flight_time"] = "ballistic"
-    """Apex: from the lift-off speed, or from the time in the air."""
-    desired: Literal["present", "pushed"] = "present"
-    """E_d of the update: of the present command, or of the one in force at the push it judges."""
-
-
-LITERAL = ShapingOptions()
-"""The paper's description."""
-
-ROBUST = ShapingOptions("dated", "debounced", "timed", "flight_time", "pushed")
-"""The readings of the tuned controller."""
 
 POWERS_OF_SIZE = {
     "liftoff_length": 1.0,
