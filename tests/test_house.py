@@ -10,7 +10,7 @@ CEILINGS = {
     "src/hopping_leg/*.py": (14, 1280),
     "src/hopping_leg/cli/**/*.py": (17, 2470),
     "src/hopping_leg/controllers/**/*.py": (20, 2880),
-    "src/hopping_leg/deploy/**/*.py": (20, 3440),
+    "src/hopping_leg/deploy/**/*.py": (20, 3450),
     "src/hopping_leg/emulator/**/*.py": (15, 2300),
     "src/hopping_leg/envs/**/*.py": (10, 1570),
     "src/hopping_leg/evaluate/**/*.py": (14, 2610),

@@ -96,7 +96,7 @@ def test_a_torque_that_is_another_is_told(factor, false):
 
 @pytest.mark.parametrize(("before", "after", "stale"), [(1, 1, False), (1, 2, True), (3, 3, True)])
 def test_torques_that_come_later_than_before_make_samples_old(before, after, stale):
-    told = lambda t: 3.0 * math.sin(40 * t)  # noqa: E731
+    told = lambda t: 3.0 * round(math.sin(40 * t))  # noqa: E731
     known = LagEvidence()
     for tick in range(200):
         t, lag = tick * PERIOD, before if tick < 100 else after

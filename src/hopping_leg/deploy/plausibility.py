@@ -15,6 +15,7 @@ leave room for impacts, play and noise, and were set on simulated runs:
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 from hopping_leg.deploy.drive_link import DriveMode, Pair, Reply
 
@@ -44,7 +45,8 @@ _LATEST = 3  # of these, the last that is a healthy drive's
 _LAG_FADING = 10  # ticks
 _LAG_CHANGE = 0.01  # of squared changes of torque over the limit squared that must be known
 _LAG_CLEAR = 3.0  # factor by which one lag must explain the torques better than one a tick away
-_LAG_WORSE = 4.0  # factor by which the usual lag, and half a tick more, must explain them worse
+_LAG_WORSE = 8.0  # factor by which the usual lag, and half a tick more, must explain them worse
+_LAG_TICKS = 4  # for so many ticks in a row
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,48 +183,55 @@ def _summed(sums: Pair, fading: float, told: float, given: float) -> Pair:
 class LagEvidence:
     """How late the drives' torques come after the commands, both joints together.
 
+    Changes from tick to tick are compared, whatever the motors' gain.
+
     Attributes:
         told: Torques that were told in the last ticks, the newest first, N m.
-        errors: Sums of the squared difference of reported torques from those told 1, 1.5, 2 ... 4
+        given: Torques of the last replies, over the limits.
+        errors: Sums of the squared difference of changes reported from those told 1, 1.5, 2 ... 4
             ticks before, over the limits squared, fading.
         changes: Sum of squared changes of the torques told, likewise.
         usual: Least of these lags, 0 the first, that ever explained the torques clearly best.
+        late: Ticks in a row that another, a tick or more after it, explained them far better.
     """
 
     told: tuple[Pair, ...] = ()
+    given: Pair = (0.0, 0.0)
     errors: tuple[float, ...] = (0.0,) * _LAGS
     changes: float = 0.0
     usual: int = _LAGS
+    late: int = 0
 
     def after(
         self, motors: tuple[MotorLine, MotorLine], replies: tuple[Reply, Reply], told: Pair
     ) -> "LagEvidence":
         """Return the evidence with fresh replies of both drives, a tick after the last ones."""
-        past = (told, *self.told)[:_TICKS]
-        if len(past) < _TICKS:
-            return LagEvidence(past, usual=self.usual)
+        past = (told, *self.told)[: _TICKS + 1]
+        hip, knee = (r.torque / m.limit for r, m in zip(replies, motors, strict=True))
+        if len(past) <= _TICKS:
+            return LagEvidence(past, (hip, knee), usual=self.usual)
         fading = math.exp(-1 / _LAG_FADING)
         errors, changes = [fading * error for error in self.errors], fading * self.changes
-        for joint, (motor, reply) in enumerate(zip(motors, replies, strict=True)):
-            shares = [motor.share(pair[joint], reply.velocity) for pair in past]
-            given = reply.torque / motor.limit
+        for joint, given in enumerate((hip - self.given[0], knee - self.given[1])):
+            velocity = replies[joint].velocity
+            shares = [motors[joint].share(pair[joint], velocity) for pair in past]
+            steps = [newer - older for newer, older in pairwise(shares)]
             for lag in range(_LAGS):
-                off = given - (shares[lag // 2] + shares[(lag + 1) // 2]) / 2
+                off = given - (steps[lag // 2] + steps[(lag + 1) // 2]) / 2
                 errors[lag] += off * off  # an overflow is infinite
-            changes += (shares[0] - shares[1]) * (shares[0] - shares[1])
+            changes += steps[0] * steps[0]
         best = errors.index(min(errors))
         away = min(errors[: max(best - 1, 0)] + errors[best + 2 :])
         clear = changes > _LAG_CHANGE and away > _LAG_CLEAR * errors[best] + 1e-6
         usual = min(self.usual, best) if clear else self.usual
-        return LagEvidence(past, tuple(errors), changes, usual)
+        least = min(errors[usual : usual + 2], default=0.0)
+        worse = changes > _LAG_CHANGE and least > _LAG_WORSE * errors[best] + _LAG_CHANGE / 4
+        late = self.late + 1 if worse and best > usual + 1 else 0
+        return LagEvidence(past, (hip, knee), tuple(errors), changes, usual, late)
 
     def stale(self) -> str:
         """Return by how much the samples are older than before, "" if they are not."""
-        if self.usual == _LAGS or self.changes < _LAG_CHANGE:
-            return ""
-        if self.usual > _LATEST:
+        if _LATEST < self.usual < _LAGS and self.changes > _LAG_CHANGE:
             return f"torques come {1 + self.usual / 2:g} ticks after their commands"
-        best = min(self.errors)
-        later = self.errors.index(best) - self.usual
-        worse = min(self.errors[self.usual : self.usual + 2]) > _LAG_WORSE * best + _LAG_CHANGE / 4
-        return f"torques come {later / 2:g} ticks later" if later > 1 and worse else ""
+        later = (self.errors.index(min(self.errors)) - self.usual) / 2
+        return f"torques come {later:g} ticks later" if self.late >= _LAG_TICKS else ""
