@@ -16,11 +16,11 @@ import jinja2
 import numpy as np
 import wasm
 
-from hopping_leg.colours import controller_colours
 from hopping_leg.controllers import registry, robot_numbers
 from hopping_leg.controllers.energy_shaping import EnergyShaping
 from hopping_leg.controllers.observation_history import OBSERVATION_HISTORIES, AnyLeg, Dated
 from hopping_leg.controllers.rollout import RolloutConfig
+from hopping_leg.figures import controller_colours
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.html_page import data_uri
 from hopping_leg.robot import (

@@ -12,7 +12,7 @@ from tests.extras import TRAINING, run_without
 ROOT = Path(hopping_leg.__file__).parent
 ORDER = ["foundation", "robot", "formats", "sim", "controllers", "identify", "envs", "rl"]
 ORDER += ["deploy", "emulator", "evaluate", "viewer", "cli"]
-FOUNDATION = {"", "arrays", "cma_strategy", "colours", "errors", "figure_style", "hop_detection"}
+FOUNDATION = {"", "arrays", "errors", "figures", "hop_detection"}
 FOUNDATION |= {"html_page", "io", "locks", "progress", "terminal", "trace", "workers"}
 BESIDE = {("viewer", "rl"), ("emulator", "rl")}
 BESIDE |= {("deploy", room) for room in ("formats", "sim", "identify", "envs", "rl")}

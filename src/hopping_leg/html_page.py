@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from hopping_leg.figure_style import to_svg
+from hopping_leg.figures import to_svg
 
 
 def page_template(package: str, name: str) -> Template:

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cma
 import numpy as np
 
-from hopping_leg import cma_strategy, hop_detection
+from hopping_leg import hop_detection
 from hopping_leg.arrays import Array
 from hopping_leg.cli.options import JsonFile, RobotFile, command_line, say, say_next, show_table
 from hopping_leg.controllers import Rollout, RolloutConfig, rollout
@@ -181,9 +182,10 @@ class Tune:
 
     def search(self, start: ShapingGains, config: RolloutConfig) -> ShapingGains:
         """Improve gains; noise and delay take seeds 0 to 8 in turn."""
-        strategy = cma_strategy.seeded_strategy(
-            to_unit(start), self.step, [0.0, 1.0], self.population, self.seed
-        )
+        normal = np.random.default_rng(self.seed).standard_normal
+        settings = {"popsize": self.population, "bounds": [0.0, 1.0], "seed": np.nan, "verbose": -9}
+        settings["randn"] = lambda *shape: normal(shape)
+        strategy = cma.CMAEvolutionStrategy(to_unit(start), self.step, settings)
         for generation in range(self.generations):
             points = strategy.ask()
             candidates = [from_unit(np.asarray(point), start) for point in points]

@@ -11,14 +11,13 @@ from matplotlib.figure import Figure
 from PIL import Image, ImageDraw, ImageSequence
 
 from hopping_leg.cli.demo import BEST
-from hopping_leg.colours import COMMAND, controller_colours
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller, robot_of
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.trials import STAIRCASE, scaled
 from hopping_leg.evaluate.video import SIZE, Clip, render_clips, sample
-from hopping_leg.figure_style import styled, to_png
+from hopping_leg.figures import COMMAND, controller_colours, encode, styled
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import load_robot
 from hopping_leg.trace import Trace
@@ -78,7 +77,7 @@ def draw_curves(traces: dict[str, Trace]) -> Figure:
 
 def with_curves(legs: list[Image.Image], curves: Figure) -> list[Image.Image]:
     """Put the curves under the legs, up to the time of each frame."""
-    whole = Image.open(io.BytesIO(to_png(curves, _DPI))).convert("RGB")
+    whole = Image.open(io.BytesIO(encode(curves, "png", _DPI))).convert("RGB")
     axes = curves.axes[0]
     ends = axes.transData.transform(
         np.array([(x, y) for x in axes.get_xlim() for y in axes.get_ylim()])

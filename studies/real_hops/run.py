@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from hopping_leg.arrays import Array
 from hopping_leg.cli.options import show_table
 from hopping_leg.errors import UsageError
-from hopping_leg.figure_style import WIDTH, colour, styled, to_svg
+from hopping_leg.figures import COLOURS, WIDTH, styled, to_svg
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import GRAVITY, Robot, load_robot
 from studies.real_hops.recorded import RIGS, Hop, load_hops
@@ -152,7 +152,11 @@ def figure(shown: Sequence[Any]) -> Figure:
         lower.plot(hop.time, hop.torque[:, 1], color="0.2")
         for number, (label, one) in enumerate(found):
             values = one.rise if rig == "boom" else one.q[:, 1]
-            style = {"color": colour(number // 2), "linestyle": ("--", "-")[number % 2], "lw": 1}
+            style = {
+                "color": COLOURS[number // 2 % len(COLOURS)],
+                "linestyle": ("--", "-")[number % 2],
+                "lw": 1,
+            }
             upper.plot(one.time, values, label=label, **style)
             lower.plot(one.time, one.torque[:, 1], **style)
         upper.set_title(f"{rig}, {hop.run.split('.')[0]}")

@@ -15,10 +15,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hopping_leg.cli.options import JsonFile, mm, show_table
-from hopping_leg.colours import controller_colours
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.evaluate.runner import software_versions
-from hopping_leg.figure_style import panels, plain_log, styled, to_svg
+from hopping_leg.figures import controller_colours, panels, styled, to_svg
 from hopping_leg.io import write_atomically
 from hopping_leg.rl.policy_evaluation import CommandResult, evaluate_policy
 from hopping_leg.rl.recipes import RECIPES
@@ -193,7 +192,9 @@ def draw(rows: list[Row]) -> Figure:
                 seconds = [row["seconds"] for row in line]
                 shown = [1e3 * row[key] or np.nan for row in line]
                 axis.plot(seconds, shown, ".-", color=colour, lw=0.8, label=label)
-        plain_log(axis, "x", "y")
+        axis.set(xscale="log", yscale="log")
+        for side in (axis.xaxis, axis.yaxis):
+            side.set_major_formatter("{x:g}")
         axis.set_ylabel(title)
     axes[0][0].legend(ncol=len(colours))
     axes[-1][0].set_xlabel("wall-clock time / s")

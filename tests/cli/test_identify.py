@@ -119,7 +119,7 @@ def write_bad(folder):
         (["good.csv", "--bounds", "hip.friction=low,high"], "gives no bounds"),
         (["good.csv", "--bounds", "thigh.mass=0,1"], "which is not fitted"),
         (["good.csv", "--seed", "-1"], "must not be negative"),
-        (["good.csv", "--starts", "0"], "at least one start"),
+        (["good.csv", "--starts", "0"], "A search needs a start"),
         (["good.csv", "--json", "good.toml"], "would replace an input"),
         (["good.csv", "--report", "."], "is a folder"),
         (["good.csv", "--json", "good.csv/leg.json"], "cannot be written there"),

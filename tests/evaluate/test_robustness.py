@@ -21,7 +21,7 @@ from hopping_leg.evaluate.robustness import (
     score_rows,
 )
 from hopping_leg.evaluate.robustness_axes import AXES, JOINT, Case, axes_named
-from hopping_leg.figure_style import to_svg
+from hopping_leg.figures import to_svg
 from hopping_leg.sim import LegSimulator
 from tests.evaluate.test_metrics import sine_trace, window_of
 

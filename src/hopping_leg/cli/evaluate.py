@@ -155,9 +155,9 @@ def _judge(entries: "list[Entry]", setup: "RolloutConfig", args: Evaluate) -> "E
 
 def _judge_robustness(args: Evaluate, command: str) -> None:
     """Run the suite, print the scores, write numbers and figure."""
-    from hopping_leg import figure_style
     from hopping_leg.evaluate import figures, tables
     from hopping_leg.evaluate.robustness import make_suite, run_suite
+    from hopping_leg.figures import to_svg
 
     entries, setup = args.load()
     out, heights, seeds = args.out or Path("runs/robustness"), args.commands, args.seeds
@@ -168,5 +168,5 @@ def _judge_robustness(args: Evaluate, command: str) -> None:
     file, figure = args.json or out / "robustness.json", out / "robustness.svg"
     tables.print_robustness(plain_console(), result)
     options.save_json(file, result)
-    io.write_atomically(figure, figure_style.to_svg(figures.draw_robustness(result)))
+    io.write_atomically(figure, to_svg(figures.draw_robustness(result)))
     options.say_written(file, figure)

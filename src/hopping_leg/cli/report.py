@@ -45,9 +45,8 @@ def run(args: Report) -> None:
 
 
 def _draw(args: Report) -> None:
-    from hopping_leg import figure_style
-    from hopping_leg.colours import controller_colours
     from hopping_leg.evaluate import report, result, trials
+    from hopping_leg.figures import controller_colours, encode
 
     if not args.traces:
         raise errors.UsageError(
@@ -57,7 +56,7 @@ def _draw(args: Report) -> None:
     controllers = list(dict.fromkeys(run.controller for run in runs))
     for picture in report.draw_report_figures(result.tabulate(runs, controllers, seed=0), runs):
         path = args.out / f"{picture.name}.{args.format}"
-        io.write_atomically(path, figure_style.ENCODERS[args.format](picture.figure))
+        io.write_atomically(path, encode(picture.figure, args.format))
         say(f"{picture.title}: {path}")
     if args.animation is not None:
         for name, colour in controller_colours(controllers).items():

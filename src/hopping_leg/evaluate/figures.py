@@ -11,12 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from hopping_leg import figure_style, hop_detection
+from hopping_leg import hop_detection
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.colours import COMMAND, controller_colours
 from hopping_leg.evaluate.metrics import START_SECONDS, SWITCH_SECONDS, stretches
 from hopping_leg.evaluate.result import Evaluation
-from hopping_leg.figure_style import WIDTH, styled
+from hopping_leg.figures import COMMAND, TORQUE_MAP, WIDTH, controller_colours, panels, styled
 from hopping_leg.trace import Trace
 
 _PHASE_SPACE_SECONDS = 10.0  # of the paper's trial
@@ -28,7 +27,7 @@ _COLUMNS = 4  # panels of robustness beside each other
 @styled
 def draw_apexes(traces: Mapping[str, Trace]) -> Figure:
     """Draw all controllers' apexes over time in one panel, under the command that they share."""
-    figure, ((axes,),) = figure_style.panels(1, height=3.0)
+    figure, ((axes,),) = panels(1, height=3.0)
     for name, paint in controller_colours(traces).items():
         hops, time = hop_detection.trace_hops(traces[name]), traces[name].column("time_s")
         look: dict[str, Any] = {"markersize": 5, "linewidth": 0.5, "alpha": 0.85}
@@ -45,7 +44,7 @@ def draw_apexes(traces: Mapping[str, Trace]) -> Figure:
 @styled
 def draw_heights(traces: Mapping[str, Trace]) -> Figure:
     """Draw base height, command and apexes over time, a panel per controller."""
-    figure, axes = figure_style.panels(len(traces))
+    figure, axes = panels(len(traces))
     for (panel,), (name, paint) in zip(axes, controller_colours(traces).items(), strict=True):
         _draw_heights(panel, traces[name], paint)
         panel.set_title(name)
@@ -86,7 +85,7 @@ def draw_phase_space(traces: Mapping[str, Trace]) -> Figure:
     torques = [np.abs(found["knee_command_nm"]) for found in shown.values()]
     ranges = [float(np.nanpercentile(t, _TYPICAL)) for t in torques if np.isfinite(t).any()]
     limit = median(ranges or [0.0]) or 1.0
-    look: dict[str, Any] = {"cmap": figure_style.TORQUE_MAP, "vmin": -limit, "vmax": limit, "s": 9}
+    look: dict[str, Any] = {"cmap": TORQUE_MAP, "vmin": -limit, "vmax": limit, "s": 9}
     look |= {"edgecolors": "0.6", "linewidths": 0.2, "rasterized": True}
     for row, (name, found) in zip(panels, shown.items(), strict=True):
         angle, speed, torque, clearance = found.values()

@@ -9,11 +9,11 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from hopping_leg.colours import controller_colours
 from hopping_leg.evaluate import figures, runner, tables
 from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.evaluate.trials import KINDS, Run
 from hopping_leg.evaluate.video import Video, fixed_traces, render_hops
+from hopping_leg.figures import controller_colours
 from hopping_leg.html_page import data_uri, page_template, svg_uri
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import Trace

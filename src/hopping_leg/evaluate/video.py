@@ -17,8 +17,8 @@ import mujoco
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from hopping_leg.colours import COMMAND, rgb
 from hopping_leg.evaluate import metrics, trials
+from hopping_leg.figures import COMMAND, rgb
 from hopping_leg.hop_detection import trace_hops
 from hopping_leg.robot import Robot, get_spec
 from hopping_leg.trace import Trace

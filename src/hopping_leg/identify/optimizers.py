@@ -11,10 +11,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+import cma
 import numpy as np
 from scipy import optimize
 
-from hopping_leg import cma_strategy, workers
+from hopping_leg import workers
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.cost import Objective, RobustLoss
@@ -64,10 +65,7 @@ class SearchOptions:
 
     def __post_init__(self) -> None:
         if self.starts < 1 or self.generations < 1 or self.population < 4 or not self.seconds > 0:
-            raise UsageError(
-                "A search needs at least one start, one generation, four candidates and some"
-                " seconds of windows in each."
-            )
+            raise UsageError("A search needs a start, a generation, 4 candidates and some seconds.")
 
 
 @dataclass(frozen=True)
@@ -208,7 +206,10 @@ def cma_es(
     low, high = parameters.bounds
     first = np.clip(np.zeros(len(low)) if start is None else start, low, high)
     bounds = [low.tolist(), high.tolist()]
-    strategy = cma_strategy.seeded_strategy(first, _SPREAD, bounds, options.population, seed)
+    settings = {"popsize": options.population, "bounds": bounds, "seed": np.nan, "verbose": -9}
+    normal = np.random.default_rng(seed).standard_normal
+    settings["randn"] = lambda *shape: normal(shape)
+    strategy = cma.CMAEvolutionStrategy(first, _SPREAD, settings)
     judges = [*shares] or [values]
     bests, means, history = list[Array](), list[Array](), list[float]()
     least, winner = np.inf, first
@@ -292,7 +293,11 @@ def _run_pass(
     """Search from every start."""
     threads = objective.threads if ray is None else 1
     objective = replace(objective, parameters=parameters, threads=threads)
-    spread = _here if ray is None else partial(partial, workers.map_rows, workers.RayWorkers(ray))
+    spread = (
+        (lambda e: e)
+        if ray is None
+        else partial(partial, workers.map_rows, workers.RayWorkers(ray))
+    )
     if plan.search == "least-squares":
         searched = partial(
             least_squares,
@@ -321,10 +326,6 @@ def _run_pass(
         ends.append(searched(start=begin, report=progress))
     ends.sort(key=lambda end: end.cost)
     return Pass(name, parameters, ends[0], tuple(end.cost for end in ends[1:]))
-
-
-def _here(evaluate: Evaluate) -> Evaluate:
-    return evaluate
 
 
 def deal(

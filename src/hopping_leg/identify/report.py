@@ -10,7 +10,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from hopping_leg.arrays import Array
-from hopping_leg.figure_style import TORQUE_MAP, WIDTH, colour, styled
+from hopping_leg.figures import COLOURS, TORQUE_MAP, WIDTH, styled
 from hopping_leg.html_page import Column, page_template, svg_uri, table
 from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json, warning
 from hopping_leg.identify.validation import RESTART, Overlay, overlays
@@ -136,8 +136,8 @@ def draw_overlay(overlay: Overlay) -> Figure:
         before, after = overlay.simulated[quantity][:, rows, joint]
         known = ~np.isnan(measured)
         axes.plot(time[known], measured[known], ".", color="0.55", markersize=3.0, label="measured")
-        axes.plot(time, before, color=colour(4), linewidth=0.9, label="before")
-        axes.plot(time, after, color=colour(0), linewidth=1.1, label="after")
+        axes.plot(time, before, color=COLOURS[4], linewidth=0.9, label="before")
+        axes.plot(time, after, color=COLOURS[0], linewidth=1.1, label="after")
         if known.any():  # what runs away before the fit is outside the picture
             shown = np.concatenate([measured[known], after[np.isfinite(after)]])
             low, high = shown.min(), shown.max()

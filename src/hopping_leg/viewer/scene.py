@@ -9,7 +9,7 @@ import numpy as np
 import viser
 
 from hopping_leg.arrays import Array
-from hopping_leg.colours import COLOURS, COMMAND, controller_colours, rgb
+from hopping_leg.figures import COLOURS, COMMAND, controller_colours, rgb
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.robot import JOINTS, Robot, build_model
 from hopping_leg.viewer.tracks import Track

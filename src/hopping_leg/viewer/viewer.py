@@ -23,8 +23,8 @@ from viser import _messages
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from hopping_leg.colours import COLOURS, rgb
 from hopping_leg.errors import UsageError
+from hopping_leg.figures import COLOURS, rgb
 from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.viewer import live_leg, panels, scene, tracks
 
