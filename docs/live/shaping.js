@@ -1,5 +1,5 @@
-// Energy shaping as it is tuned and shipped: a port of `src/hopping_leg/controllers/energy_shaping`
-// with the readings `ROBUST`. The comments name the paper's equations.
+// Energy shaping as it is tuned and shipped: a port of `src/hopping_leg/controllers/energy_shaping`.
+// The comments name the paper's equations.
 
 import { DATA, JOINTS, PERIOD, clamp } from "live/data.js";
 import { DatedObserver } from "live/history.js";
