@@ -27,12 +27,9 @@ from hopping_leg.cli.options import (
     check_outputs,
     command_line,
     going_on,
-    say,
-    show_table,
 )
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.optimizers import SearchOptions
-from hopping_leg.progress import Progress
 from hopping_leg.robot import load_robot, load_tree, numbers, shipped_robots
 
 
@@ -297,19 +294,6 @@ def test_training_leaves_nothing_in_the_temporary_folder(tmp_path):
     environment["TMPDIR"] = str(tmp_path)
     subprocess.run([sys.executable, "-c", code], env=environment, check=True)
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("text", ["[red]run[/red]", "[/]", "a :smile: b", "[link=x]"])
-def test_no_text_of_a_user_is_taken_for_markup(capsys, monkeypatch, text):
-    show_table(("name", text), [(text, 1)], text)
-    say(text)
-    monkeypatch.setattr("hopping_leg.progress._SILENCE", 0.01)
-    with Progress(text) as bar:
-        bar.show(text, 0.5, text)
-        time.sleep(0.1)
-    captured = capsys.readouterr()
-    assert captured.out.count(text) == 4
-    assert captured.err.count(text) >= 1
 
 
 @pytest.mark.parametrize("option", ["json", "out", "report", "traces", "folder"])

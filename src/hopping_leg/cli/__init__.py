@@ -24,7 +24,6 @@ from typing import Any, get_type_hints
 
 import tyro
 
-from hopping_leg import terminal
 from hopping_leg.errors import HoppingLegError, UsageError, unknown_name
 
 VERBS = {
@@ -54,7 +53,9 @@ TERMINATED = 143
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line, by default the process's own; return the exit code."""
-    terminal.accept_any_text()
+    for stream in (sys.stdout, sys.stderr):  # replace what their encoding does not know
+        with contextlib.suppress(AttributeError, ValueError, io.UnsupportedOperation):
+            stream.reconfigure(errors="replace")  # type: ignore[union-attr]
     with _interrupted_by_sigterm():
         return guard(lambda: _dispatch(list(sys.argv[1:] if arguments is None else arguments)))
 
@@ -149,7 +150,7 @@ def _dispatch(words: list[str]) -> int:
         return 0
     if verb not in VERBS:
         raise UsageError(unknown_name("verb", verb, VERBS) + " Try `hop --help`.")
-    from hopping_leg.progress import said_if_slow
+    from hopping_leg.terminal import said_if_slow
 
     with said_if_slow(f"Loading hop {verb}."):
         module = importlib.import_module(f"hopping_leg.cli.{verb}")

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Literal
 
 import tyro
 
-from hopping_leg import io, progress
+from hopping_leg import io, terminal
 from hopping_leg.cli import options
 from hopping_leg.robot import CONTROL_RATE, TIMESTEP, SoftLimits, load_robot
 from hopping_leg.terminal import plain_console
@@ -124,7 +124,7 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     if args.report:
         from hopping_leg.evaluate.report import render_videos, write_report
 
-        with progress.said_if_slow("Writing the report."):
+        with terminal.said_if_slow("Writing the report."):
             videos = render_videos(judged, setup.robot) if args.video else None
             io.write_atomically(args.report, write_report(judged, videos))
     options.say_written(args.json, args.report, args.traces)
@@ -134,7 +134,7 @@ def _judge(entries: "list[Entry]", setup: "RolloutConfig", args: Evaluate) -> "E
     from hopping_leg.evaluate import evaluate, trials
 
     floors = ("soft", "stiff") if args.floor == "both" else (args.floor,)
-    with progress.Progress(parts=len(entries) * len(floors)) as bar:
+    with terminal.Progress(parts=len(entries) * len(floors)) as bar:
         judged = [
             evaluate(
                 entries,
@@ -162,7 +162,7 @@ def _judge_robustness(args: Evaluate, command: str) -> None:
     entries, setup = args.load()
     out, heights, seeds = args.out or Path("runs/robustness"), args.commands, args.seeds
     suite = make_suite(setup, axes=args.axes, commands=heights, repeats=seeds, seed=args.seed)
-    with progress.Progress(parts=len(entries)) as bar:
+    with terminal.Progress(parts=len(entries)) as bar:
         found = run_suite(entries, suite, bar.show)
     result = {"command": command, **found}
     file, figure = args.json or out / "robustness.json", out / "robustness.svg"

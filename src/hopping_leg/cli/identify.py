@@ -21,8 +21,8 @@ from rich.table import Column
 
 from hopping_leg import errors, io
 from hopping_leg.cli.options import JsonFile, command_line, save_json, say, say_next, show_table
-from hopping_leg.progress import Progress, said_if_slow
 from hopping_leg.robot import JOINTS, load_robot
+from hopping_leg.terminal import Progress, said_if_slow
 
 if TYPE_CHECKING:
     from hopping_leg.identify.result import Identified
@@ -76,7 +76,7 @@ class FitProgress(Progress):
 
     def update(self, stage: str, share: float, cost: float) -> None:
         """Show what is being done, the share done of all, 0 to 1, and the lowest cost."""
-        self.show(stage, share, f"cost {cost:.5g}", key="fit")
+        self.show(stage, share, f"cost {cost:.5g}")
 
 
 def run(args: Identify) -> None:

@@ -41,8 +41,8 @@ from hopping_leg.identify.excitation import (
     load_excitation,
     make_excitation,
 )
-from hopping_leg.progress import Progress
 from hopping_leg.robot import TIMESTEP, Robot, load_robot, parent_robot
+from hopping_leg.terminal import Progress
 
 
 @dataclass(frozen=True)
@@ -216,8 +216,11 @@ def _play(args: Play) -> None:
         return
     files = []
     with Progress(parts=len(loaded)) as bar:
+
+        def tell(stem: str, done: int, ticks: int) -> None:
+            bar.show(stem, done / ticks)
+
         for number, (stem, excitation) in enumerate(loaded):
-            show = partial(bar.show_tick, stem, len(excitation))
             recording = play_excitation.play(
                 excitation,
                 robot,
@@ -225,7 +228,7 @@ def _play(args: Play) -> None:
                 seed=args.seed + number,
                 gains=gains,
                 timestep=args.timestep,
-                on_tick=show,
+                on_tick=partial(tell, stem),
             )
             file = args.out / f"{robot.name}-{stem}.parquet"
             recording.save(file)

@@ -15,8 +15,8 @@ import tyro
 
 from hopping_leg import errors, io
 from hopping_leg.cli.options import say
-from hopping_leg.progress import said_if_slow
 from hopping_leg.robot import load_robot
+from hopping_leg.terminal import said_if_slow
 
 if TYPE_CHECKING:
     from hopping_leg.evaluate import trials

@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING
 from hopping_leg import io
 from hopping_leg.cli import options
 from hopping_leg.errors import UsageError
-from hopping_leg.progress import Progress
 from hopping_leg.robot import Robot, load_robot, parent_robot
+from hopping_leg.terminal import Progress
 
 if TYPE_CHECKING:
     from hopping_leg.evaluate import EvaluationRun

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Literal
 
 from hopping_leg.cli.options import JsonFile, at_least, going_on, save_json, say_next
-from hopping_leg.progress import said_if_slow
 from hopping_leg.robot import load_robot
+from hopping_leg.terminal import said_if_slow
 
 
 @dataclass(frozen=True)

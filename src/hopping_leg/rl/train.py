@@ -13,7 +13,6 @@ import torch
 from hopping_leg import errors, io, locks
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.envs import TaskLeg
-from hopping_leg.progress import Progress
 from hopping_leg.rl import (
     loggers,
     onnx_export,
@@ -29,6 +28,7 @@ from hopping_leg.rl.policy_evaluation import calibrate
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.selection import Selection
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.terminal import Progress
 
 
 class TrainingProgress(Progress):
@@ -50,7 +50,7 @@ class TrainingProgress(Progress):
         if more > 0:
             note += f" · {more / max(seconds, 1e-9):.0f} steps/s"
         note += best
-        self.show(self._title, share, note, key="training")
+        self.show(self._title, share, note)
 
     def prepare(self, what: str, share: float) -> None:
         """Show the share of what is done before the training, 0 to 1."""
@@ -58,7 +58,7 @@ class TrainingProgress(Progress):
 
     def finish(self, what: str) -> None:
         """Show what is done after the training itself."""
-        self.show(self._title, 1.0, about=f", {what}", key="training")
+        self.show(self._title, 1.0, about=f", {what}")
 
 
 _RANGE_LEGS, _RANGE_STRIDE = 24, 5
