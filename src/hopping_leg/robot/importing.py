@@ -106,32 +106,23 @@ def imported_robot(
     for joint in JOINTS:
         entries |= _motor_limits(joint, entries)
     entries |= given
-    valid, assumed, missing = _units(), dict[str, str](), list[str]()
-    for path, unit in valid.items():
-        if path in entries or path.startswith("hardware.") or path.endswith(".armature"):
-            continue
+    units, assumed, missing = _units(), dict[str, str](), list[str]()
+    for path in (path for path in units if path not in entries):
         if (assumption := _assumption(path, entries)) is not None:
-            entries[path], assumed[path] = assumption, assumption[1]
-        else:
-            missing.append(f"{path} ({unit})")
+            value, assumed[path] = assumption
+            entries[path] = value, f"assumed: {assumed[path]}"
+        elif not path.startswith("hardware.") and not path.endswith(".armature"):
+            missing.append(f"{path} ({units[path]})")
     if missing:
         raise RobotError(
             f"{origin} does not say {', '.join(missing)}; name the motor, --motor"
             f" {' or '.join(MOTORS)}, or give each, e.g. --set motor.gear_ratio=9."
         )
-    for joint in JOINTS:
-        path = f"hardware.{joint}.torque_constant"
-        speed, gear = (entries[f"{joint}.motor.{k}"][0] for k in ("no_load_speed", "gear_ratio"))
-        if path not in entries:
-            why = f"that of the motor's no-load speed at {Hardware.bus_voltage:g} V"
-            entries[path] = torque_constant(speed * gear / Hardware.bus_voltage), why
-            assumed[path] = why
     file = Path(origin).name
     tree: Tree = {"name": safe_file_name(leg.name), "description": f"imported from {file}"}
-    for path in (path for path in valid if path in entries):
+    for path in (path for path in units if path in entries):
         value, source = entries[path]
-        source = f"assumed: {source}" if path in assumed else source
-        entry = {"value": float(f"{value:.12g}"), "unit": valid[path], "source": source}
+        entry = {"value": float(f"{value:.12g}"), "unit": units[path], "source": source}
         tree = replace_at(tree, path, entry)
     lines = [
         f"Imported from {file}; every number says where it is from. Hip 0 is straight",
@@ -190,6 +181,12 @@ def _assumption(path: str, known: dict[str, Entry]) -> Entry | None:
         return (-reach if name == "stop_lower" else reach), "as legv2; measure where it ends"
     if name in ("lower", "upper"):
         return _soft_limit(joint, name, known)
+    if name.endswith(".torque_constant"):
+        motor = f"{name.partition('.')[0]}.motor"
+        if f"{motor}.no_load_speed" in known and f"{motor}.gear_ratio" in known:
+            rotor = known[f"{motor}.no_load_speed"][0] * known[f"{motor}.gear_ratio"][0]
+            why = f"that of the motor's no-load speed at {Hardware.bus_voltage:g} V"
+            return torque_constant(rotor / Hardware.bus_voltage), why
     torque, peak = (known.get(f"{joint}.motor.{key}") for key in ("torque_limit", "peak_torque"))
     most = peak or torque
     if name == "motor.torque_limit" and peak:

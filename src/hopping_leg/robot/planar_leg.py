@@ -90,7 +90,7 @@ def read_leg(path: Path, names: Names) -> PlanarLeg:
     thigh, shank = map(float, np.arctan2(lines[:, 1], lines[:, 0]))
     hip, hip_angle = _joint(tree, parts.hip, normal, thigh, -np.pi)
     knee, knee_angle = _joint(tree, parts.knee, normal, shank - thigh, -1.5 * np.pi)
-    base = tree.heavy(parts.base)
+    base, lengths = tree.heavy(parts.base), np.linalg.norm(lines, axis=1).tolist()
     spheres = [point for point in tree.points(parts.shank) if point.radius > 0]
     around = [s for s in spheres if _aside(tree, parts.hip, s.position - ends[2]) < _SAME_PLACE]
     found: dict[str, dict[str, Entry]] = {
@@ -98,10 +98,12 @@ def read_leg(path: Path, names: Names) -> PlanarLeg:
         "rail": {} if parts.rail is None else _losses(tree, parts.rail),
         "hip": hip,
         "knee": knee,
-        "thigh": _link(tree, parts.thigh, ends[0], lines[0], normal, flat),
-        "shank": _link(tree, parts.shank, ends[1], lines[1], normal, flat),
+        "thigh": {"length": (lengths[0], f"{tree.joint(parts.hip)} to {tree.joint(parts.knee)}")},
+        "shank": {"length": (lengths[1], f"{tree.joint(parts.knee)} to '{parts.foot.name}'")},
         "foot": {"radius": (around[0].radius, f"sphere of {around[0].name}")} if around else {},
     }
+    found["thigh"] |= _link(tree, parts.thigh, ends[0], lines[0], normal, flat)
+    found["shank"] |= _link(tree, parts.shank, ends[1], lines[1], normal, flat)
     own = (parts.hip, parts.knee, parts.rail)
     moving = parts.base | parts.thigh | parts.shank
     joints = [i for i in range(tree.model.njnt) if tree.model.jnt_bodyid[i] in moving]
@@ -268,24 +270,23 @@ def _joint(
 def _link(
     tree: Description, lump: set[int], joint: Array, line: Array, normal: Array, flat: Array
 ) -> dict[str, Entry]:
-    """Return bodies as a link along ``line`` from its upper joint.
+    """Return mass, com and inertia of bodies as a link along ``line`` from its upper joint.
 
     The inertia is such that the one about the joint is kept.
     """
     model, data, bodies = tree.model, tree.data, tree.heavy(lump)
-    length = float(np.linalg.norm(line))
     if not bodies:
-        return {"length": (length, "between the joints")}
+        return {}
     masses, coms = model.body_mass[bodies], (data.xipos[bodies] - joint) @ flat.T
     mass = float(masses.sum())
     com = masses @ coms / mass
     across = np.einsum("bij,i->bj", data.ximat[bodies].reshape(-1, 3, 3), normal)
     own = np.sum(tree.inertia[bodies] * across**2) + masses @ np.sum((coms - com) ** 2, axis=1)
-    along, beside = float(com @ line) / length, float(com @ [-line[1], line[0]]) / length
+    length, across_line = np.linalg.norm(line), np.array([-line[1], line[0]])
+    along, beside = float(com @ line / length), float(com @ across_line / length)
     said = _said(tree, bodies)
     left = f"; {1e3 * abs(beside):.2g} mm beside the line are left out"
     return {
-        "length": (length, "between the joints"),
         "mass": (mass, said),
         "com": (along, f"{said}, along the link{left if abs(beside) > 1e-6 else ''}"),
         "inertia": (float(own) + mass * beside**2, f"{said}, about the centre of mass"),
