@@ -18,7 +18,7 @@ from hopping_leg.html_page import Column, table
 from hopping_leg.terminal import print_table
 
 Row = dict[str, Any]
-_NARROW = 8  # characters of a heading on a line of the terminal
+_NARROW = 7  # characters of a heading on a line of the terminal
 
 
 def millimetres(value: float | None, sign: bool = False) -> str:
@@ -27,128 +27,99 @@ def millimetres(value: float | None, sign: bool = False) -> str:
     return f"{1e3 * value:{'+' if sign else ''}z.1f}" if there else "-"  # type: ignore[operator]
 
 
-def _column(
-    heading: str,
-    name: str,
-    form: str = "",
-    scale: float = 1,
-    bad: Callable[[Any], bool] = lambda _value: False,
-) -> Column:
-    """Return the column of an entry that rows have, scaled and formatted; a dash for None."""
+_LOOKS: dict[str, tuple[str, float, str]] = {
+    "command_m": ("m", 1, ".2f"),
+    "lower_m": ("m", 1, ".2f"),
+    "upper_m": ("m", 1, ".2f"),
+    "p": ("", 1, ".1g"),
+    "overlap": ("%", 100, ".1f"),
+    **dict.fromkeys(("cliffs_delta", "cliffs_delta_low", "cliffs_delta_high"), ("", 1, "+.3f")),
+    "_fraction": ("%", 100, ".0f"),
+    "_share": ("%", 100, ".0f"),
+    "_rad_s": ("rad/s", 1, ".1f"),
+    "_minutes": ("min", 1, ".1f"),
+    "_hz": ("Hz", 1, ".2f"),
+    "_nm": ("N m", 1, ".1f"),
+    "_m": ("mm", 1e3, ".1f"),
+    "_w": ("W", 1, ".1f"),
+    "_v": ("V", 1, ".1f"),
+}
+"""How values of a name, or of names with an ending, are shown: unit, factor, form."""
+
+_SIGNED = ("median_error", "bias")
+
+_BAD: dict[str, Callable[[Any], bool]] = {
+    **dict.fromkeys(
+        ("skipped_hops", "body_contacts", "stop_contacts", "motionless"), lambda count: count > 0
+    ),
+    "rated_torque_share": lambda share: share > 1,
+    "p": lambda p: p >= 1e-3,
+}
+"""What deserves attention."""
+
+
+def _column(name: str) -> Column:
+    """Return the column of an entry that rows have, under its name and unit; a dash for None."""
+    ending = next((end for end in _LOOKS if end[0] == "_" and name.endswith(end)), "")
+    unit, factor, form = _LOOKS.get(name, _LOOKS.get(ending, ("", 1, "")))
+    form = f"+z{form}" if any(word in name for word in _SIGNED) else form
+    words = name.removesuffix(ending).replace("_", " ")
+    bad = _BAD.get(name, lambda _value: False)
 
     def text(row: Row) -> str:
         value = row[name]
-        return "-" if value is None else format(value if scale == 1 else scale * value, form)
+        return "-" if value is None else format(factor * value if unit else value, form)
 
-    return Column(heading, text, lambda row: row[name] is not None and bad(row[name]))
-
-
-def _pair(heading: str, form: str, *names: str, sign: bool = False) -> Column:
-    """Return a column of two lengths, put into a form such as ``"{} to {}"``."""
-    return Column(heading, lambda row: form.format(*(millimetres(row[n], sign) for n in names)))
-
-
-def _count(heading: str, name: str) -> Column:
-    """Return a column of what should not have happened."""
-    return _column(heading, name, bad=lambda count: count > 0)
+    return Column(
+        f"{words} / {unit}" if unit else words,
+        text,
+        lambda row: row[name] is not None and bad(row[name]),
+    )
 
 
-_CONTROLLER = _column("controller", "controller")
-_COMMAND = _column("command / m", "command_m", ".2f")
-_ERROR = _column("median error / mm", "median_error_m", "+z.1f", 1e3)
-_INTERVAL = _pair(
-    "95 % interval / mm", "{} to {}", "median_error_low_m", "median_error_high_m", sign=True
-)
-_STD = _column("std / mm", "std_m", ".1f", 1e3)
-_HOPS = _column("hops", "hops")
-_SKIPPED = _count("skipped", "skipped_hops")
-_FLIGHT = _column("flight / %", "flight_fraction", ".0f", 100)
-_LOWEST = _column("lowest base / mm", "min_base_height_m", ".0f", 1e3)
-_CONTACTS = _count("body contacts", "body_contacts")
+def _columns(names: str) -> list[Column]:
+    return [_column(name) for name in names.split()]
 
-SHORT = (_CONTROLLER, _COMMAND, _ERROR, _STD, _HOPS, _SKIPPED, _FLIGHT, _LOWEST, _CONTACTS)
+
+_HOW = "controller command_m"
+_SHORT = f"{_HOW} median_error_m std_m hops skipped_hops flight_fraction min_base_height_m"
+SHORT = _columns(f"{_SHORT} body_contacts")
 """What the terminal shows of the summary."""
 
-SUMMARY = (
-    *(_CONTROLLER, _COMMAND, _ERROR, _INTERVAL, _STD, _column("IQR / mm", "iqr_m", ".1f", 1e3)),
-    *(_HOPS, _SKIPPED, _column("hops / s", "hop_rate_hz", ".2f"), _FLIGHT),
-    *(_column("sink / mm", "max_sink_m", ".0f", 1e3), _LOWEST, _CONTACTS),
-)
+_ERROR = "median_error_m median_error_low_m median_error_high_m"
 
-LOAD = (
-    _CONTROLLER,
-    _COMMAND,
-    _column("peak hip / N m", "peak_hip_torque_nm", ".1f"),
-    _column("peak knee / N m", "peak_knee_torque_nm", ".1f"),
-    _column("RMS hip / N m", "rms_hip_torque_nm", ".1f"),
-    _column("RMS knee / N m", "rms_knee_torque_nm", ".1f"),
-    _column("RMS of rated / %", "rated_torque_share", ".0f", 100, bad=lambda share: share > 1),
-    _column("limited after / min", "thermal_minutes", ".1f"),
-    _column("mechanical / W", "mean_power_w", ".1f"),
-    _column("electrical / W", "mean_electrical_power_w", ".1f"),
-    _column("peak braking / W", "peak_regeneration_w", ".0f"),
-    _column("bus rise / V", "bus_voltage_rise_v", ".1f"),
-)
-
-JOINTS = (
-    _CONTROLLER,
-    _COMMAND,
-    _column("knee speed / (rad/s)", "peak_knee_speed_rad_s", ".1f"),
-    _column("torque reversals / Hz", "torque_reversals_hz", ".1f"),
-    _column("outside soft limits / %", "outside_limits_fraction", ".1f", 100),
-    _column("soft limits, RMS / N m", "soft_limit_rms_nm", ".2f"),
-    _column("soft limits' share of torque / %", "soft_limit_share", ".1f", 100),
-    _count("stop contacts", "stop_contacts"),
-)
-
-GROUPS = (
-    _column("group", "group"),
-    *(_COMMAND, _column("policies", "policies"), _count("never hopped", "motionless")),
-    *(_ERROR, _INTERVAL, _column("worst |error| / mm", "worst_abs_error_m", ".1f", 1e3)),
-    *(_column("median std / mm", "median_std_m", ".1f", 1e3), _SKIPPED, _CONTACTS),
-)
-
-ESTIMATORS = (
-    _CONTROLLER,
-    _pair("in flight / mm", "{} ± {}", "flight_bias_m", "flight_std_m"),
-    _pair("in stance / mm", "{} ± {}", "stance_bias_m", "stance_std_m"),
-    _pair("apex, after landing / mm", "{} ± {}", "apex_bias_m", "apex_std_m"),
-    _HOPS,
-)
-
-NEIGHBOURS = (
-    _CONTROLLER,
-    _column("lower command / m", "lower_m", ".2f"),
-    _column("higher command / m", "upper_m", ".2f"),
-    _column("p, rank sums of runs", "p", ".1g", bad=lambda p: p >= 1e-3),
-    _column("Cliff's delta", "cliffs_delta", "+.3f"),
-    _column("95 % from", "cliffs_delta_low", "+.3f"),
-    _column("to", "cliffs_delta_high", "+.3f"),
-    _column("hops in the overlap / %", "overlap", ".1f", 100),
-)
+TABLES = {
+    "summary": f"{_HOW} {_ERROR} std_m iqr_m hops skipped_hops hop_rate_hz flight_fraction"
+    " max_sink_m min_base_height_m body_contacts",
+    "groups": f"group command_m policies motionless {_ERROR} worst_abs_error_m median_std_m"
+    " skipped_hops body_contacts",
+    "load": f"{_HOW} peak_hip_torque_nm peak_knee_torque_nm rms_hip_torque_nm rms_knee_torque_nm"
+    " rated_torque_share thermal_minutes mean_power_w mean_electrical_power_w peak_regeneration_w"
+    " bus_voltage_rise_v",
+    "joints": f"{_HOW} peak_knee_speed_rad_s torque_reversals_hz outside_limits_fraction"
+    " soft_limit_rms_nm soft_limit_share stop_contacts",
+    "ladder": f"{_HOW} median_error_m std_m hops skipped_hops body_contacts",
+    "distributions": "controller lower_m upper_m p cliffs_delta cliffs_delta_low"
+    " cliffs_delta_high overlap",
+    "estimators": "controller flight_bias_m flight_std_m stance_bias_m stance_std_m apex_bias_m"
+    " apex_std_m hops",
+}
+"""Tables of a page: what each shows of its rows, by their names in the JSON."""
 
 
 def evaluation_tables(evaluation: Row) -> dict[str, Markup]:
     """Return every table of a page, by what it is about, from an evaluation's JSON."""
     summary, secondary = evaluation["summary"], evaluation["secondary"] or {"summary": []}
-    pairs = [
+    rows = {**evaluation, "load": summary, "joints": summary}
+    rows["distributions"] = [
         {"controller": one["controller"], **pair}
         for one in evaluation["neighbours"]
         for pair in one["neighbours"]
     ]
-    about = "estimated minus true, mean ± standard deviation"
     return {
-        "summary": table(SUMMARY, summary),
-        "secondary": table(SUMMARY, secondary["summary"]),
-        "groups": table(GROUPS, evaluation["groups"]),
-        "load": table(LOAD, summary),
-        "joints": table(JOINTS, summary),
-        "ladder": table(
-            (_CONTROLLER, _COMMAND, _ERROR, _STD, _HOPS, _SKIPPED, _CONTACTS), evaluation["ladder"]
-        ),
-        "distributions": table(NEIGHBOURS, pairs),
+        **{about: table(_columns(names), rows[about]) for about, names in TABLES.items()},
+        "secondary": table(_columns(TABLES["summary"]), secondary["summary"]),
         "staircase": _staircase_table(evaluation["staircase"]),
-        "estimators": table(ESTIMATORS, evaluation["estimators"], about),
     }
 
 
@@ -160,10 +131,11 @@ def _staircase_table(stairs: Sequence[Row]) -> Markup:
 
     commands = stairs[0]["commands_m"] if stairs else ()
     columns = (
-        *(_CONTROLLER, *(step(number, command) for number, command in enumerate(commands))),
+        _column("controller"),
+        *(step(number, command) for number, command in enumerate(commands)),
         Column("monotone", lambda row: "yes" if row["monotone"] else "no"),
         Column("runs monotone", lambda row: f"{row['monotone_runs']} of {row['runs']}"),
-        _SKIPPED,
+        _column("skipped_hops"),
     )
     return table(columns, stairs, "median apex at each step / mm")
 
@@ -236,7 +208,7 @@ def print_robustness(console: Console, result: Row) -> None:
         f" {c['seeds']} seeds from {c['seed']}."
     )
     names = next(iter(rows.values()))
-    _print_table(console, title, [_column(name, name) for name in names], list(rows.values()))
+    _print_table(console, title, [_column(name) for name in names], list(rows.values()))
 
 
 def _print_notes(console: Console, notes: Sequence[str]) -> None:
@@ -253,7 +225,9 @@ def _print_table(
     shown = Table(box=box.SIMPLE_HEAD, padding=0)
     shown.add_column(columns[0].heading, min_width=14)
     for column in columns[1:]:
-        shown.add_column(textwrap.fill(column.heading, _NARROW), justify="right")
+        shown.add_column(
+            textwrap.fill(column.heading, _NARROW, break_long_words=False), justify="right"
+        )
     for row in rows:
         shown.add_row(*(column.text(row) for column in columns))
     print_table(shown, console)
