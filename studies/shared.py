@@ -23,7 +23,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.cli import guard, read_options
-from hopping_leg.cli.options import KEPT, check_outputs, command_line, save_json, show_table
+from hopping_leg.cli.options import KEPT, command_line, save_json, show_table
 from hopping_leg.errors import UsageError
 from hopping_leg.io import versions, write_atomically, write_json
 from hopping_leg.sim import compile_physics
@@ -64,7 +64,6 @@ def _run(name: str, options: Any, given: Sequence[str]) -> int:  # noqa: ANN401
     program = f"python -m studies.{name}"
     about = inspect.getdoc(importlib.import_module(f"studies.{name}"))
     args = read_options(options, program, about, given)
-    check_outputs(args)
     if get_args(options):
         program = f"{program} {_word_of(type(args))}"
     command = command_line(program, args, KEPT | {"recordings"})

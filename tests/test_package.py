@@ -12,8 +12,8 @@ import pytest
 
 import hopping_leg
 from hopping_leg.cli import read_options
-from hopping_leg.cli.demo import Demo
 from hopping_leg.cli.doctor import PURPOSES
+from hopping_leg.cli.view import View
 from tests.doc_pages import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -65,7 +65,7 @@ def test_the_container_is_built_by_the_commands_of_the_readme():
     assert commands
     assert all(command in readme for command in commands)
     (call,) = [json.loads(line.removeprefix("CMD ")) for line in lines if line.startswith("CMD ")]
-    assert not read_options(Demo, "hop demo", None, call[1:]).browser
+    assert not read_options(View, "hop demo", None, call[1:]).browser
 
 
 def test_doctor_knows_every_extra():

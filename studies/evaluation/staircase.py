@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw, ImageSequence
 
-from hopping_leg.cli.demo import BEST
+from hopping_leg.cli import DEMO
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.command_schedule import CommandSchedule
-from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller, robot_of
+from hopping_leg.controllers.registry import load_controller, robot_of
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.trials import STAIRCASE, scaled
 from hopping_leg.evaluate.video import SIZE, Clip, render_clips, sample
@@ -34,7 +34,7 @@ _DPI = 100
 
 def main() -> None:
     """Hop, render and write the file."""
-    names = (BEST, ENERGY_SHAPING)
+    names = DEMO
     robot = load_robot(robot_of(names))
     stairs = CommandSchedule(tuple((c, STEP_SECONDS) for c in scaled(STAIRCASE, robot)))
     setup = RolloutConfig(robot)

@@ -7,18 +7,15 @@ their verb is called, so that ``hop --help`` is instant and nothing but training
 """
 
 import contextlib
-import errno
 import importlib
 import inspect
 import io
-import itertools
 import os
 import re
 import signal
 import sys
 import threading
-import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from typing import Any, get_type_hints
 
@@ -43,12 +40,14 @@ VERBS = {
 }
 """Every verb with its line in the overview."""
 
+DEMO = ("universal", "energy-shaping")
+"""What `hop view` shows as `hop demo`: the policy for any leg, and the classical controller."""
+
 _CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
 _LIST = re.compile(r"[\w.+-]+(,[\w.+-]+)+")
 
 FAILED = 2
 INTERRUPTED = 130
-TERMINATED = 143
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -56,30 +55,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):  # replace what their encoding does not know
         with contextlib.suppress(AttributeError, ValueError, io.UnsupportedOperation):
             stream.reconfigure(errors="replace")  # type: ignore[union-attr]
-    with _interrupted_by_sigterm():
-        return guard(lambda: _dispatch(list(sys.argv[1:] if arguments is None else arguments)))
-
-
-class _Terminated(KeyboardInterrupt):
-    """SIGTERM came."""
-
-
-@contextlib.contextmanager
-def _interrupted_by_sigterm() -> Iterator[None]:
-    """Let SIGTERM end a verb as Ctrl-C does, with what it says of how to go on."""
-
-    def end(*_: object) -> None:
-        raise _Terminated
-
-    default = signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
-    if not default or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C does
+    return guard(lambda: _dispatch(list(sys.argv[1:] if arguments is None else arguments)))
 
 
 def guard(program: Callable[[], int]) -> int:
@@ -89,17 +67,14 @@ def guard(program: Callable[[], int]) -> int:
         return program()
     except HoppingLegError as error:
         sentence = str(error)
-    except KeyboardInterrupt as stop:
+    except KeyboardInterrupt:
         sentence = "Interrupted; finished files are whole and nothing was half-written."
-        code = TERMINATED if isinstance(stop, _Terminated) else INTERRUPTED
+        code = INTERRUPTED
     except BrokenPipeError:
         sys.stderr.close()
         return FAILED
     except OSError as error:
-        where = f" {error.filename}" if error.filename else ""
-        sentence = f"Could not use{where or ' a file'}: {error.strerror or error}."
-        if error.errno == errno.ENOSPC:
-            sentence = f"The disk is full; could not write{where}. Free some space and try again."
+        sentence = f"Could not use {error.filename or 'a file'}: {error.strerror or error}."
     except ModuleNotFoundError as error:
         extra = _EXTRAS.get((error.name or "").split(".")[0])
         if extra is None:
@@ -108,27 +83,9 @@ def guard(program: Callable[[], int]) -> int:
             f"This needs {error.name}, which comes with the extra '{extra}':"
             f" pip install 'hopping-leg[{extra}]'."
         )
-    except Exception as error:
-        name = _refused_variable(error)
-        if name is None:
-            raise
-        sentence = f"'{os.environ[name]}' in the variable {name} does not work here; unset it."
     with contextlib.suppress(OSError, ValueError):  # the terminal may be gone
         print(f"hop: {sentence}", file=sys.stderr)
     return code
-
-
-def _refused_variable(error: Exception) -> str | None:
-    """Return the variable that ended the import of MuJoCo or matplotlib, if it was one."""
-    frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
-    imported = [f.f_globals["__name__"] for f in frames if f.f_code.co_name == "<module>"]
-    for name, module in (
-        ("MUJOCO_GL", "mujoco.rendering.classic.gl_context"),
-        ("MPLBACKEND", "matplotlib"),
-    ):
-        if module in imported and name in os.environ:
-            return name
-    return None
 
 
 _EXTRAS = {
@@ -152,14 +109,11 @@ def _dispatch(words: list[str]) -> int:
         raise UsageError(unknown_name("verb", verb, VERBS) + " Try `hop --help`.")
     from hopping_leg.terminal import said_if_slow
 
+    own, rest = ("view", [*DEMO, *rest]) if verb == "demo" else (verb, rest)
     with said_if_slow(f"Loading hop {verb}."):
-        module = importlib.import_module(f"hopping_leg.cli.{verb}")
-        from hopping_leg.cli.options import check_outputs
-
+        module = importlib.import_module(f"hopping_leg.cli.{own}")
     kind = get_type_hints(module.run, include_extras=True)["args"]
-    args = read_options(kind, f"hop {verb}", inspect.getdoc(module), rest)
-    check_outputs(args)
-    module.run(args)
+    module.run(read_options(kind, f"hop {verb}", inspect.getdoc(module), rest))
     return 0
 
 
@@ -174,35 +128,14 @@ def read_options(
     Lists may be given with commas or spaces.
 
     Raises:
-        UsageError: The words are not as the options ask.
-        SystemExit: Help was asked for, and is printed.
+        SystemExit: Help was asked for, or the words are not as the options ask; either is printed.
     """
     apart = [part for word in words for part in _parts(word)]
-    said = io.StringIO()
-    try:
-        with contextlib.redirect_stderr(said):
-            return tyro.cli(
-                options, prog=program, description=description, args=apart, config=_CONFIG
-            )
-    except SystemExit as ended:
-        if not ended.code:
-            raise
-        raise UsageError(f"{_sentence(said.getvalue())} `{program} --help` shows more.") from ended
+    return tyro.cli(options, prog=program, description=description, args=apart, config=_CONFIG)
 
 
 def _parts(word: str) -> list[str]:
     return word.split(",") if _LIST.fullmatch(word) and not os.path.exists(word) else [word]  # noqa: PTH110
-
-
-def _sentence(box: str) -> str:
-    """Return what is wrong from the box that tyro prints: what stands above its inner line."""
-    inside = [line.strip("\u2502| ") for line in box.splitlines()[1:]]
-    begun = itertools.dropwhile(lambda line: not line.strip("\u2500-"), inside)
-    above = itertools.takewhile(lambda line: line.strip("\u2500-\u2570\u256f"), begun)
-    text = " ".join(line for line in above if line)
-    near = re.search(r"Perhaps you meant:\s*(--[\w-]+)", "\n".join(inside))
-    text = text if text.endswith((".", "!", "?")) else f"{text}."
-    return f"{text} Did you mean {near[1]}?" if near else text
 
 
 def overview() -> str:

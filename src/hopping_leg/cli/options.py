@@ -2,7 +2,6 @@
 
 import contextlib
 import dataclasses
-import os
 import shlex
 import sys
 from collections.abc import Collection, Iterable, Iterator
@@ -39,26 +38,6 @@ def at_least(least: int, **values: int | None) -> None:
         if value is not None and value < least:
             flag = name.replace("_", "-")
             raise UsageError(f"--{flag} is {value} but must be {least} or more.")
-
-
-_FILES, _FOLDERS = ("json", "report"), ("out", "traces", "folder")  # Options that name results
-
-
-def check_outputs(args: Any) -> None:  # noqa: ANN401
-    """Refuse places where no result can be written, before any time is spent on it."""
-    for field in dataclasses.fields(args) if dataclasses.is_dataclass(args) else ():
-        name, path = field.name, getattr(args, field.name)
-        check_outputs(path)
-        if name not in (*_FILES, *_FOLDERS) or not isinstance(path, Path):
-            continue
-        if name in _FILES and path.is_dir():
-            raise UsageError(f"--{name} {path} is a folder; give a file.")
-        whole = path.resolve()
-        place = next(p for p in (whole, *whole.parents) if p.exists())
-        if place == whole and place.is_file():
-            place = place.parent  # a file is replaced
-        if (place != whole and not place.is_dir()) or not os.access(place, os.W_OK):
-            raise UsageError(f"--{name} {path} cannot be written there; give another place.")
 
 
 def save_json(path: Path | None, value: object) -> None:

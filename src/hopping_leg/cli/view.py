@@ -4,9 +4,10 @@ Without further words a live simulation: change height, controller, robot, paylo
 delay while it hops, push it, pause, step, go slow; a second controller hops beside the first. With
 --trace it replays traces, simulated or from hardware; with --box it shows the real leg while
 `hop deploy` runs. It needs no screen on this computer: on another one, open the printed address
-through `ssh -L 8080:localhost:8080`.
+through `ssh -L 8080:localhost:8080`. `hop demo` shows the best policy beside energy shaping.
 
 Examples:
+  hop demo
   hop view
   hop view fast energy-shaping --height 0.32
   hop view runs/mine/policy.onnx --robot examples/my_leg.toml
