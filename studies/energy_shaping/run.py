@@ -14,14 +14,9 @@ from hopping_leg.controllers.energy_shaping import paper_energy_shaping, tuned_e
 from hopping_leg.controllers.energy_shaping.controller import EnergyShaping, LiteralEnergyShaping
 from hopping_leg.controllers.energy_shaping.virtual_leg import LegView, Phase
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.metrics import (
-    ESTIMATED_APEX,
-    HopWindow,
-    apex_errors,
-    errors_of,
-    measure,
-    pooled_apexes,
-)
+from hopping_leg.evaluate.metrics import ESTIMATED_APEX, HopWindow, apex_errors, measure
+from hopping_leg.evaluate.summary import summarise
+from hopping_leg.io import plain
 from hopping_leg.robot import DEFAULT_ROBOT, TIMESTEP, Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, NoiseAndDelay, Simulator
 from hopping_leg.trace import Trace
@@ -32,6 +27,11 @@ COMMANDS = (0.25, 0.30, 0.35)
 
 RANGE = (0.22, 0.25, 0.28, 0.30, 0.32, 0.35, 0.38, 0.40)
 """Heights over which the baseline is to hold, m."""
+
+_SHOWN = (
+    *("median_error_m", "std_m", "hops", "hop_rate_hz", "skipped_hops", "flight_fraction"),
+    *("min_base_height_m", "body_contacts"),
+)
 
 
 @dataclass(frozen=True)
@@ -207,21 +207,10 @@ class Baseline:
 
 
 def _row(case: Case, command: float, windows: Sequence[HopWindow]) -> Row:
-    apex, error = pooled_apexes(windows), float(np.median(np.concatenate(errors_of(windows))))
-    settled = sum(w.settled for w in windows)
-    return {
-        "case": case.name,
-        "command_m": command,
-        "median_m": command + error,
-        "median_error_m": error,
-        "std_m": float(np.std(apex)) if len(apex) else None,
-        "hops": len(apex),
-        "hop_rate_hz": len(apex) / settled,
-        "skipped_hops": sum(w.skipped for w in windows),
-        "flight_fraction": sum(w.flight for w in windows) / settled,
-        "min_base_height_m": min(w.min_height for w in windows),
-        "body_contacts": sum(w.base_contacts + w.knee_contacts for w in windows),
-    }
+    found = plain(vars(summarise(case.name, command, windows, 0)))
+    error = found["median_error_m"]
+    row = {"case": case.name, "command_m": command, "median_m": command + error}
+    return row | {name: found[name] for name in _SHOWN}
 
 
 def summary(case: Case, rows: Sequence[Row]) -> Row:

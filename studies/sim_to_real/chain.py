@@ -10,13 +10,19 @@ from hopping_leg.cli.options import Heights, JsonFile, at_least
 from hopping_leg.controllers.energy_shaping.gains import load_gains
 from hopping_leg.controllers.registry import ENERGY_SHAPING
 from hopping_leg.evaluate import runner
-from hopping_leg.evaluate.statistics import LEAST_TWINS
 from hopping_leg.rl.recipes import get_recipe, randomise
 from hopping_leg.robot import load_robot
 from studies.shared import Row, do_all
 from studies.sim_to_real import steps
 from studies.sim_to_real.methods import DEFAULT, Method, choose_methods
-from studies.sim_to_real.twins import Twin, disturbance_of, find_twins, fingerprint, simulated
+from studies.sim_to_real.twins import (
+    LEAST_TWINS,
+    Twin,
+    disturbance_of,
+    find_twins,
+    fingerprint,
+    simulated,
+)
 
 
 @dataclass(frozen=True)

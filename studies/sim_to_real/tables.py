@@ -9,6 +9,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate import statistics
 from studies.shared import Row
+from studies.sim_to_real.twins import LEAST_TWINS
 
 _BOOTSTRAP_SEED = 0
 _ERROR = "median_abs_error_m"
@@ -37,19 +38,21 @@ def tabulate(meanings: Mapping[str, str], trials: Sequence[Row]) -> Row:
                 "median_std_m": float(np.median(stds or [np.nan])),
             })  # fmt: skip
     first, *others = meanings
+    count = len(_by("twin", trials))
+    note = f"{count} twins are too few for intervals over twins; give {LEAST_TWINS} or more."
     return {
         "rows": rows,
         "methods": [_whole(n, m, _of(trials, "method", n)) for n, m in meanings.items()],
         "comparison": [compare(first, other, trials) for other in others],
         "trials": list(trials),
-        "notes": statistics.twins_note(len(_by("twin", trials))),
+        "notes": [note] if count < LEAST_TWINS else [],
     }
 
 
 def median_over_twins(trials: Sequence[Row], name: str) -> Row:
     """Return the median of a number, in m, and its interval over the twins."""
     numbers = _of_twins(trials, name)
-    low, high = statistics.median_interval(numbers, _BOOTSTRAP_SEED, statistics.LEAST_TWINS)
+    low, high = statistics.median_interval(numbers, _BOOTSTRAP_SEED, LEAST_TWINS)
     start = name.removesuffix("_m")
     median = float(np.median(np.concatenate(numbers)))
     return {name: median, f"{start}_low_m": low, f"{start}_high_m": high}
@@ -69,7 +72,7 @@ def compare(first: str, other: str, trials: Sequence[Row]) -> Row:
         over, under = (np.median(np.concatenate([of[i] for i in index])) for of in errors)
         return float(over / under)
 
-    low, high = statistics.bootstrap(range(count), ratio, _BOOTSTRAP_SEED, statistics.LEAST_TWINS)
+    low, high = statistics.bootstrap(range(count), ratio, _BOOTSTRAP_SEED, LEAST_TWINS)
     return {
         "method": other,
         "over": first,

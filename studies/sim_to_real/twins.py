@@ -15,6 +15,9 @@ from hopping_leg.robot import NO_MISMATCH, Latency, Robot, load_robot, parent_ro
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 from hopping_leg.sim.randomization import draw_twin
 
+LEAST_TWINS = 20
+"""Twins that an interval over twins needs: with fewer a bootstrap interval is too narrow."""
+
 
 @dataclass(frozen=True)
 class Twin:

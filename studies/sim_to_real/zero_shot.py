@@ -23,7 +23,7 @@ from hopping_leg.evaluate import runner, statistics, trials
 from hopping_leg.hop_detection import find_hops, measure_hops
 from hopping_leg.robot import JOINTS, Robot, load_robot, parent_robot
 from studies.shared import Row, do_all
-from studies.sim_to_real.twins import disturbance_of, drawn_twin, fingerprint
+from studies.sim_to_real.twins import LEAST_TWINS, disturbance_of, drawn_twin, fingerprint
 
 COMMANDS = (0.22, 0.24, 0.26, 0.28, 0.30, 0.32, 0.34, 0.36, 0.38, 0.40)
 """Apex heights of a leg of the paper's size, m; others are asked for as many times as much."""
@@ -159,7 +159,7 @@ def _share(rows: Sequence[Row], name: str, holds: Callable[[Row], bool]) -> Row:
         return float(np.mean([one for i in index for one in shares[i]]))
 
     everyone = range(len(shares))
-    low, high = statistics.bootstrap(everyone, mean, 0, statistics.LEAST_TWINS)
+    low, high = statistics.bootstrap(everyone, mean, 0, LEAST_TWINS)
     return {name: mean(everyone), f"{name}_low": float(low), f"{name}_high": float(high)}
 
 

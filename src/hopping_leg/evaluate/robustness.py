@@ -15,7 +15,7 @@ import polars as pl
 from scipy.stats import qmc
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers import Controller, RolloutConfig, rollout
+from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.rollout import Perturbation
 from hopping_leg.evaluate import metrics, runner, statistics, trials
 from hopping_leg.evaluate.robustness_axes import AXES, NOMINAL, Axis, Case, axes_named
@@ -116,7 +116,12 @@ def run_suite(
                 on_progress(label, (number + done / ticks) / len(parts))
 
             plan = make_trials(axis, suite)
-            met[axis.name] = pl.DataFrame(run_axis(entry.controller, suite.setup, plan, tick))
+            run = rollout(
+                entry.controller, suite.setup, plan.commands, plan.seed, tick, plan.perturbation
+            )
+            met[axis.name] = pl.DataFrame(
+                [outcome(t, metrics.measure(run.trace(leg))) for leg, t in enumerate(plan.trials)]
+            )
             levels += level_rows(entry.label, axis.name, met[axis.name])
         del met[NOMINAL.name]
         scores += score_rows(entry.label, met, suite.seed)
@@ -231,21 +236,6 @@ def _stepped(trial: RobustnessTrial, commands: Sequence[float], time: Array) -> 
     pair = (bottom, bottom + trial.case.command_step)
     first, second = pair if share <= 0.5 else pair[::-1]
     return np.where(np.floor(time / SWITCH_SECONDS) % 2 == 0, first, second)
-
-
-def run_axis(
-    controller: Controller,
-    setup: RolloutConfig,
-    plan: AxisTrials,
-    on_tick: Callable[[int, int], None] | None = None,
-) -> list[dict[str, Any]]:
-    """Let a controller that knows ``setup`` alone meet all trials of an axis; return a row each."""
-    run = rollout(
-        controller, setup, plan.commands, plan.seed, on_tick, perturbation=plan.perturbation
-    )
-    return [
-        outcome(trial, metrics.measure(run.trace(leg))) for leg, trial in enumerate(plan.trials)
-    ]
 
 
 def outcome(trial: RobustnessTrial, windows: Sequence[metrics.HopWindow]) -> dict[str, Any]:

@@ -29,18 +29,6 @@ class Case:
     """Height of the command's steps, m."""
 
 
-def with_numbers(robot: Robot, numbers: Mapping[str, float]) -> Robot:
-    """Return a robot with other numbers, each at a dotted path, e.g. ``"rail.friction"``."""
-    for path, value in numbers.items():
-        robot = io.replace_at(robot, path, value)
-    return robot
-
-
-def times(robot: Robot, factor: float, *paths: str) -> Robot:
-    """Return a robot with the numbers at some dotted paths multiplied."""
-    return with_numbers(robot, {path: factor * attrgetter(path)(robot) for path in paths})
-
-
 Alter = Callable[[Case, float], Case]
 """Puts a level of an axis into a case."""
 
@@ -64,21 +52,27 @@ class Axis:
     """Name on RealAIGym's robustness leaderboard, if it is there."""
 
 
+def _with(case: Case, numbers: Mapping[str, float]) -> Case:
+    """Return a case whose robot has other numbers, each at a dotted path, ``"rail.friction"``."""
+    robot = case.robot
+    for path, value in numbers.items():
+        robot = io.replace_at(robot, path, value)
+    return replace(case, robot=robot)
+
+
 def _payload(case: Case, share: float) -> Case:
-    mass = case.robot.base.mass + share * case.robot.mass
-    return replace(case, robot=with_numbers(case.robot, {"base.mass": mass}))
+    return _with(case, {"base.mass": case.robot.base.mass + share * case.robot.mass})
 
 
 def _damped_ground(case: Case, factor: float) -> Case:
     """MuJoCo's k is 1 / (time constant x ratio)^2 and b is 2 / time constant: k stays."""
-    softer = times(case.robot, 1 / factor, "contact.time_constant")
-    return replace(case, robot=times(softer, factor, "contact.damping_ratio"))
+    time, ratio = case.robot.contact.time_constant, case.robot.contact.damping_ratio
+    numbers = {"contact.time_constant": time / factor, "contact.damping_ratio": factor * ratio}
+    return _with(case, numbers)
 
 
 def _rubbing_joints(case: Case, torque: float) -> Case:
-    robot = case.robot
-    more = {f"{j}.friction": getattr(robot, j).friction + torque for j in JOINTS}
-    return replace(case, robot=with_numbers(robot, more))
+    return _with(case, {f"{j}.friction": getattr(case.robot, j).friction + torque for j in JOINTS})
 
 
 _STIFFNESS, _STIFFNESS_DAMPING = 300.0, 0.03
@@ -95,17 +89,17 @@ def _backlash(case: Case, angle: float) -> Case:
         if drive.stiffness is None:
             numbers[f"{at}.stiffness"] = _STIFFNESS
             numbers[f"{at}.stiffness_damping"] = _STIFFNESS_DAMPING
-    return replace(case, robot=with_numbers(case.robot, numbers))
+    return _with(case, numbers)
 
 
 def _times(*paths: str) -> Alter:
-    return lambda case, factor: replace(case, robot=times(case.robot, factor, *paths))
+    return lambda case, factor: _with(
+        case, {path: factor * attrgetter(path)(case.robot) for path in paths}
+    )
 
 
 def _numbers(*paths: str) -> Alter:
-    return lambda case, value: replace(
-        case, robot=with_numbers(case.robot, dict.fromkeys(paths, value))
-    )
+    return lambda case, value: _with(case, dict.fromkeys(paths, value))
 
 
 def _joints(path: str) -> Alter:

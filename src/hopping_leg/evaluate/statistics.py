@@ -15,11 +15,8 @@ from scipy import stats
 
 from hopping_leg.arrays import Array
 
-CONFIDENCE = 0.95
+_TAILS = (2.5, 97.5)  # of a 95 % interval, percent
 RESAMPLES = 1000
-
-LEAST_TWINS = 20
-"""Twins that an interval over twins needs: with fewer a bootstrap interval is too narrow."""
 
 Interval = tuple[float, float]
 
@@ -66,8 +63,7 @@ def bootstrap(
     rng = np.random.default_rng(seed)
     draws = rng.integers(len(units), size=(RESAMPLES, len(units)))
     values = np.array([statistic([units[i] for i in draw]) for draw in draws])
-    tail = 50 * (1 - CONFIDENCE)
-    interval: Array = np.percentile(values, [tail, 100 - tail], axis=0)
+    interval: Array = np.percentile(values, _TAILS, axis=0)
     return interval
 
 
@@ -80,16 +76,6 @@ def median_interval(runs: Sequence[Array], seed: int, least: int = 2) -> Interva
     return float(low), float(high)
 
 
-def twins_note(count: int) -> list[str]:
-    """Say so where there are too few twins for an interval."""
-    if count >= LEAST_TWINS:
-        return []
-    return [
-        f"{count} twin{' is' if count == 1 else 's are'} too few for intervals over twins; give"
-        f" {LEAST_TWINS} or more."
-    ]
-
-
 def share_interval(scores: Array, seed: int) -> Interval:
     """Return the 95 % interval of a mean score, given one per realisation, 0 to 1, (n,).
 
@@ -99,8 +85,7 @@ def share_interval(scores: Array, seed: int) -> Interval:
     """
     rng, mean = np.random.default_rng(seed), scores.mean()
     weights = rng.dirichlet([*np.ones(len(scores)), 0.5, 0.5], 4 * RESAMPLES)
-    tail = 50 * (1 - CONFIDENCE)
-    low, high = np.percentile(weights @ np.append(scores, [0.0, 1.0]), [tail, 100 - tail])
+    low, high = np.percentile(weights @ np.append(scores, [0.0, 1.0]), _TAILS)
     return float(min(low, mean)), float(max(high, mean))
 
 
