@@ -21,10 +21,7 @@ A fault script is TOML; `hop emulate --kinds` lists what it may name:
 
 import contextlib
 import math
-import signal
 import sys
-import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -37,10 +34,8 @@ from hopping_leg.emulator.mode_machine import Notice
 from hopping_leg.robot import DEFAULT_ROBOT, JOINTS
 
 if TYPE_CHECKING:
-    from hopping_leg.emulator.drive import EmulatedDrive
     from hopping_leg.emulator.server import Server
 
-_STATUS_PERIOD = 0.2  # s
 _RECENTLY = 1.0  # Before the drives stopped, s
 
 
@@ -92,22 +87,18 @@ def run(args: Emulate) -> None:
     )
     robot, port = start.build(), start.open()
     seconds = math.inf if args.seconds is None else args.seconds
-    try:
-        with _ending_signals() as over:
-            ids = " and ".join(str(drive.id) for drive in robot.drives)
-            say(f"Drives {ids} of {robot.robot.name} behind {port}")
-            say_next(_deployment(args.robot, str(port)))
-            sys.stdout.flush()
-            if args.realtime and prefer_this_thread() is not None:
-                say("Without real-time priority the drives may answer late under load.")
-            server = Server(robot, port)
-            display = _Display(server)
-            server.on_turn = display.renew
-            with uninterrupted():
-                server.run(lambda: bool(over) or robot.time >= seconds)
-            display.end()
-    finally:
-        port.close()
+    with contextlib.closing(port), contextlib.suppress(KeyboardInterrupt):
+        ids = " and ".join(str(drive.id) for drive in robot.drives)
+        say(f"Drives {ids} of {robot.robot.name} behind {port}")
+        say_next(_deployment(args.robot, str(port)))
+        sys.stdout.flush()
+        if args.realtime and prefer_this_thread() is not None:
+            say("Without real-time priority the drives may answer late under load.")
+        server = Server(robot, port)
+        server.on_turn = _Events(server).tell
+        with uninterrupted():
+            server.run(lambda: robot.time >= seconds)
+    say(f"The emulator ended after {robot.time:.1f} s.")
 
 
 def _deployment(robot: str, port: str) -> list[str]:
@@ -126,82 +117,37 @@ def _kind_cells(name: str) -> tuple[str, ...]:
     return name, kind.text, f"{kind.value:g}" if kind.unit else "", kind.unit, lasts
 
 
-@contextlib.contextmanager
-def _ending_signals() -> Iterator[list[int]]:
-    over: list[int] = []
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    before = {number: signal.signal(number, lambda n, _: over.append(n)) for number in numbers}
-    try:
-        yield over
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-class _Display:
-    """Events on lines of their own; the state on a line that is renewed, on a terminal only."""
+class _Events:
+    """Tells faults, changes of mode and that the computer was late, each on a line."""
 
     def __init__(self, server: "Server") -> None:
         self._server, self._robot = server, server.robot
         self._modes = [drive.machine.mode for drive in self._robot.drives]
         self._faults_shown = 0
-        self._live = sys.stdout.isatty()
-        self._due = time.monotonic()
 
-    def renew(self) -> None:
-        """Show what is new."""
-        clear = "\r\x1b[K" if self._live else ""
-        for line in self._events():
-            print(f"{clear}{line}", flush=True)
-        if self._live and time.monotonic() >= self._due:
-            self._due = time.monotonic() + _STATUS_PERIOD
-            print(f"{clear}{self._status(self._server.lost)}", end="", flush=True)
-
-    def end(self) -> None:
-        if self._live:
-            print()
-        print(f"The emulator ended after {self._robot.time:.1f} s.", flush=True)
-
-    def _events(self) -> Iterator[str]:
-        """Yield a line for each new fault and change of mode."""
-        robot, log = self._robot, self._robot.fault_injector.log
+    def tell(self) -> None:
+        """Print what is new."""
+        robot, log, before = self._robot, self._robot.fault_injector.log, self._modes
         for begun, fault in log[self._faults_shown :]:
             who = "" if fault.kind == "unplug" else f" ({fault.drive})"
-            yield f"{begun:7.3f} s  fault: {KINDS[fault.kind].text}{who}"
+            print(f"{begun:7.3f} s  fault: {KINDS[fault.kind].text}{who}", flush=True)
         self._faults_shown = len(log)
-        before = self._modes.copy()
-        for joint, drive in enumerate(robot.drives):
-            mode = drive.machine.mode
-            if mode is not before[joint]:
-                self._modes[joint] = mode
-                why, code = "", drive.machine.fault
-                if mode is DriveMode.FAULT:
-                    known = [kind(code) for kind in (FaultCode, Notice) if code in set(kind)]
-                    why = f": {known[0].name.lower().replace('_', ' ') if known else 'unknown'}"
-                yield f"{robot.time:7.3f} s  {JOINTS[joint]}: {_mode_text(drive)}{why}"
+        self._modes = [drive.machine.mode for drive in robot.drives]
+        for name, mode, old, drive in zip(JOINTS, self._modes, before, robot.drives, strict=True):
+            if mode is not old:
+                why = _why(drive.machine.fault) if mode is DriveMode.FAULT else ""
+                text = mode.name.lower().replace("_", " ")
+                print(f"{robot.time:7.3f} s  {name}: {text}{why}", flush=True)
         late = self._server.latest(_RECENTLY)
         if late and DriveMode.POSITION in before and DriveMode.POSITION not in self._modes:
-            yield (
+            print(
                 f"{robot.time:7.3f} s  this computer was late, by {late * 1e3:.0f} ms: the drives"
                 " stood still so long; end other programs, or permit real-time priority (rtprio in"
-                " /etc/security/limits.conf)"
+                " /etc/security/limits.conf)",
+                flush=True,
             )
 
-    def _status(self, lost: float) -> str:
-        robot = self._robot
-        parts = [f"{robot.time:7.1f} s"]
-        for joint, (name, drive) in enumerate(zip(JOINTS, robot.drives, strict=True)):
-            _, _, torque = robot.leg.sensed(joint)
-            given = robot.leg.transforms[joint].joint_torque(torque) if drive.active else 0.0
-            angle = math.degrees(robot.leg.q[joint])
-            parts.append(f"{name} {_mode_text(drive):<12} {angle:+7.1f} deg {given:+6.2f} N m")
-        parts.append(f"height {robot.leg.height:.3f} m{' held' if robot.held else ''}")
-        if lost > 0.1:
-            parts.append(f"{lost:.1f} s lost: the computer is too busy")
-        return " | ".join(parts)
 
-
-def _mode_text(drive: "EmulatedDrive") -> str:
-    mode, code = drive.machine.mode, drive.machine.fault
-    text = mode.name.lower().replace("_", " ")
-    return f"{text} {code}" if code else text
+def _why(code: int) -> str:
+    known = [kind(code) for kind in (FaultCode, Notice) if code in set(kind)]
+    return f" {code}: {known[0].name.lower().replace('_', ' ') if known else 'unknown'}"

@@ -68,17 +68,6 @@ class Identify:
     """Simulate on the Ray cluster at this address; `local` starts one on this machine."""
 
 
-class FitProgress(Progress):
-    """Stage, share done, time left and cost of a fit, as a context manager."""
-
-    def __init__(self) -> None:
-        super().__init__("preparing")
-
-    def update(self, stage: str, share: float, cost: float) -> None:
-        """Show what is being done, the share done of all, 0 to 1, and the lowest cost."""
-        self.show(stage, share, f"cost {cost:.5g}")
-
-
 def run(args: Identify) -> None:
     """Identify a leg."""
     from hopping_leg.identify import plan, recording, result
@@ -111,14 +100,14 @@ def run(args: Identify) -> None:
             rate, source = r.metadata.rate_hz, r.metadata.source
             say(f"{use}: {about}, {seconds:.4g} s at {rate:g} Hz, {source}")
             say(*(f"  {warning}" for warning in r.warnings))
-    with FitProgress() as progress:
+    with Progress("preparing") as bar:
         identified = identify(
             recordings,
             robot,
             validate=judges,
             options=options,
             seed=args.seed,
-            report=progress.update,
+            report=lambda stage, share, cost: bar.show(stage, share, f"cost {cost:.5g}"),
         )
     result.save_robot(identified, args.out, origin)
     command = command_line("hop identify", args, ("threads", "ray"))

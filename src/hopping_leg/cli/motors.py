@@ -5,14 +5,10 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from rich.table import Table
-from rich.text import Text
-
-from hopping_leg.cli.options import say
+from hopping_leg.cli.options import say, show_table
 from hopping_leg.deploy import preflight, safety_limits
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import JOINTS, Robot
-from hopping_leg.terminal import print_table
 
 if TYPE_CHECKING:
     from hopping_leg.deploy.moteus_link import MoteusLink
@@ -59,13 +55,8 @@ def ask(question: str, *, yes: bool) -> None:
 
 def show(findings: Sequence[preflight.Finding]) -> None:
     """Print checks as a table and complaints as sentences."""
-    table = Table("check", *JOINTS)
-    found = {(f.check, f.joint): f for f in findings}
-    for name in dict.fromkeys(f.check for f in findings):
-        cells: list[Text] = []
-        for joint in range(len(JOINTS)):
-            f = found.get((name, joint))
-            cells.append(Text(f.found if f else "", "red" if f and f.complaint else ""))
-        table.add_row(name, *cells)
-    print_table(table)
+    found = {(f.check, f.joint): f.found for f in findings}
+    names = dict.fromkeys(f.check for f in findings)
+    rows = ((name, *(found.get((name, j), "") for j in range(len(JOINTS)))) for name in names)
+    show_table(("check", *JOINTS), rows)
     say(*(f"- {f.complaint[0].upper()}{f.complaint[1:]}" for f in findings if f.complaint))

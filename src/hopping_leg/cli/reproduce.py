@@ -166,7 +166,6 @@ def _record(twin: Robot, believed: str, folder: Path) -> "Iterator[Recording]":
 
 def _identify(recordings: "list[Recording]", believed: str, folder: Path, *, quick: bool) -> str:
     """Fit the believed robot to the recordings; return the identified robot's file."""
-    from hopping_leg.cli.identify import FitProgress
     from hopping_leg.identify.optimizers import SearchOptions
     from hopping_leg.identify.pipeline import IdentifyOptions, identify
     from hopping_leg.identify.result import save_robot
@@ -181,8 +180,13 @@ def _identify(recordings: "list[Recording]", believed: str, folder: Path, *, qui
     if quick:
         effort = replace(effort, rounds=1, evaluations=2)
     asked = IdentifyOptions(bounds=bounds, effort=effort)
-    with FitProgress() as progress:
-        found = identify(recordings, start, options=asked, report=progress.update)
+    with Progress("preparing") as bar:
+        found = identify(
+            recordings,
+            start,
+            options=asked,
+            report=lambda stage, share, cost: bar.show(stage, share, f"cost {cost:.5g}"),
+        )
     save_robot(found, file, believed)
     return str(file)
 
