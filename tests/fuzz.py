@@ -104,11 +104,11 @@ class Kind:
 
 def _framed(header, data):
     """Return a flight recording whose frames are cut from a content, checksums valid."""
-    from hopping_leg.deploy.flight_recorder import _MAGIC, _frame
+    from hopping_leg.flight_recording import MAGIC, frame
 
     parts = data.split(b"\n\n")
     kinds = [int(part[:1] or b"0", 36) % 4 if part[:1].isalnum() else 0 for part in parts]
-    return _MAGIC + b"".join(_frame(k, p[1:]) for k, p in zip(kinds, parts, strict=True))
+    return MAGIC + b"".join(frame(k, p[1:]) for k, p in zip(kinds, parts, strict=True))
 
 
 def _with_card(content, card):
@@ -256,7 +256,8 @@ def _traces(form):
 
 
 def _boxes(form):
-    from hopping_leg.deploy.flight_recorder import FlightRecorder, recover
+    from hopping_leg.deploy.flight_recorder import FlightRecorder
+    from hopping_leg.flight_recording import recover
 
     columns = ("time_s", "command_m", "hip_position_rad")
     first = json.dumps({"columns": columns, "header": {"robot": "legv2"}}).encode()

@@ -10,10 +10,10 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.deploy.drive_link import DriveMode
-from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.deploy.hardware_trials import Performance
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.errors import TraceError
+from hopping_leg.flight_recording import SUFFIX, recover
 from hopping_leg.robot.parameters import JOINTS
 from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.trace import Trace

@@ -11,11 +11,11 @@ import time
 from pathlib import Path
 
 from hopping_leg.deploy.drive_link import DriveMode
-from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.transport import open_transport
 from hopping_leg.errors import TraceError
+from hopping_leg.flight_recording import SUFFIX, recover
 from hopping_leg.robot.parameters import JOINTS, Robot
 from hopping_leg.trace import Trace
 from studies.fault_campaign.case import Case, Result, Scene, words

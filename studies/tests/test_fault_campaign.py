@@ -11,8 +11,9 @@ import pytest
 from hopping_leg.controllers.registry import robot_of
 from hopping_leg.deploy import loop
 from hopping_leg.deploy.drive_link import Action, DriveCommand, DriveMode
-from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder
+from hopping_leg.deploy.flight_recorder import FlightRecorder
 from hopping_leg.emulator.faults import KINDS
+from hopping_leg.flight_recording import SUFFIX
 from studies.fault_campaign.campaign import Faults, play_case
 from studies.fault_campaign.case import Case
 from studies.fault_campaign.families import FAMILIES, HOP_SECONDS

@@ -7,8 +7,9 @@ import time
 import numpy as np
 import pytest
 
-from hopping_leg.deploy.flight_recorder import FlightRecorder, read_recording, recover
+from hopping_leg.deploy.flight_recorder import FlightRecorder
 from hopping_leg.errors import TraceError
+from hopping_leg.flight_recording import read_recording, recover
 from hopping_leg.trace import Trace
 
 COLUMNS = ("time_s", "command_m", "hip_position_rad")

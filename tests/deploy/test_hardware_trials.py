@@ -15,7 +15,6 @@ from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.drive_info import configure, home, inspect
 from hopping_leg.deploy.drive_link import BRAKE
-from hopping_leg.deploy.flight_recorder import recover
 from hopping_leg.deploy.hardware_trials import header_of, perform
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.preflight import check_drives, require_fit, required_settings
@@ -26,6 +25,7 @@ from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import HardwareError, TraceError
+from hopping_leg.flight_recording import recover
 from hopping_leg.robot import SoftLimits, load_robot
 from hopping_leg.sim import SoftLimiter
 from hopping_leg.trace import Trace

@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 from hopping_leg.controllers.joint_pd import JointGains
 from hopping_leg.deploy import realtime
 from hopping_leg.deploy.drive_link import BRAKE, STOP, Action, DriveMode, Reply
-from hopping_leg.deploy.flight_recorder import recover
 from hopping_leg.deploy.loop import SampleBuffer, columns
 from hopping_leg.deploy.motion_sequence import Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.standing_check import Squat
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.errors import ControllerError
+from hopping_leg.flight_recording import recover
 from hopping_leg.robot import kinematics, load_robot, shipped_robots
 from tests.deploy.fakes import LEG, POSES, FakeClock, FakeLink, Still, make_loop
 

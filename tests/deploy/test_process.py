@@ -14,10 +14,10 @@ from studies.fault_campaign.emulator_process import EmulatorProcess
 
 from hopping_leg.cli import main
 from hopping_leg.deploy.drive_link import DriveMode
-from hopping_leg.deploy.flight_recorder import recover
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.errors import TraceError
+from hopping_leg.flight_recording import recover
 from hopping_leg.trace import Trace
 
 pytestmark = pytest.mark.slow

@@ -13,7 +13,8 @@ from PIL import Image
 
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.rollout import RolloutConfig, rollout
-from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder
+from hopping_leg.deploy.flight_recorder import FlightRecorder
+from hopping_leg.flight_recording import SUFFIX
 from hopping_leg.robot import load_robot
 from hopping_leg.viewer.live_leg import LiveSimulation
 from hopping_leg.viewer.panels import HEIGHT_STEP, KEY_STEP

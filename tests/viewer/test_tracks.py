@@ -3,9 +3,10 @@ import polars as pl
 import pytest
 
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder
+from hopping_leg.deploy.flight_recorder import FlightRecorder
 from hopping_leg.deploy.loop import columns
 from hopping_leg.errors import RobotError, TraceError, UsageError
+from hopping_leg.flight_recording import SUFFIX
 from hopping_leg.robot import kinematics, load_robot
 from hopping_leg.trace import Trace
 from hopping_leg.viewer.tracks import FIELDS, RecorderSource, ReplaySource, Track

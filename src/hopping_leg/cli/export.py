@@ -13,8 +13,8 @@ from pathlib import Path
 import tyro
 
 from hopping_leg.cli.options import JsonFile, RobotFile, save_json, say_written, show_table
-from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.errors import UsageError
+from hopping_leg.flight_recording import SUFFIX, recover
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import load_robot, to_urdf
 from hopping_leg.trace import Trace

@@ -84,7 +84,7 @@ def _animation(
 
 
 def _trace(path: Path) -> Path:
-    from hopping_leg.deploy.flight_recorder import SUFFIX, recover
+    from hopping_leg.flight_recording import SUFFIX, recover
 
     if path.suffix != SUFFIX:
         return path

@@ -15,6 +15,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hopping_leg import flight_recording
 from hopping_leg.controllers import protocol
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.deploy import drive_link, flight_recorder, safety_limits, stop_reasons, supervisor
@@ -89,7 +90,7 @@ def perform(
         TraceError: The flight recording cannot be created, or the trace cannot be written.
         HardwareError: The controller did not return, or a second signal ended the run.
     """
-    recording = path.with_suffix(flight_recorder.SUFFIX)
+    recording = path.with_suffix(flight_recording.SUFFIX)
     recorder = flight_recorder.FlightRecorder(
         recording, columns(sequence.controller), header, threaded=threaded
     )
@@ -168,7 +169,7 @@ def _finish(
     if recorder.lost:
         complaint = f"{recorder.lost} entries of the record are lost ({recorder.error})."
     try:
-        trace = flight_recorder.recover(kept)
+        trace = flight_recording.recover(kept)
         if recorder.error is not None:
             notice = f"The flight recorder could not write for a time: {recorder.error}."
             notices += (notice,)
@@ -218,7 +219,7 @@ def new_path(folder: Path, name: str) -> Path:
     safe = safe_file_name(name)
     stamp = datetime.datetime.now(datetime.UTC).strftime("%Y%m%d-%H%M%S")
     path, count = folder / f"{safe}-{stamp}.parquet", 1
-    while path.exists() or path.with_suffix(flight_recorder.SUFFIX).exists():
+    while path.exists() or path.with_suffix(flight_recording.SUFFIX).exists():
         count += 1
         path = folder / f"{safe}-{stamp}-{count}.parquet"
     return path

@@ -12,7 +12,7 @@ import polars as pl
 
 from hopping_leg import errors, hop_detection
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorderTail
+from hopping_leg.flight_recording import SUFFIX, FlightRecorderTail
 from hopping_leg.robot import Robot, kinematics, load_robot
 from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.trace import Trace

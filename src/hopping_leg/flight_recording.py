@@ -1,0 +1,167 @@
+"""Flight recordings: how `hop deploy` keeps a run on disk while it happens, and what reads them.
+
+A file of frames, each ``kind, length, content, CRC-32``: one header (JSON), rows of floats, events
+(JSON). A frame that was cut off, as the process was killed, is left out.
+"""
+
+import contextlib
+import os
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from hopping_leg import errors, trace
+from hopping_leg.arrays import Array
+from hopping_leg.io import parse_json
+
+HEADER, ROW, EVENT = range(3)
+"""Kinds of frames."""
+
+SUFFIX = ".blackbox"
+"""End of the files' names."""
+
+MAGIC = b"HOPBOX1\n"
+"""What every file begins with."""
+
+_FRAME = struct.Struct("<BI")
+_CRC = struct.Struct("<I")
+_LARGEST = 1 << 24  # Content that no frame exceeds, bytes; a length beyond it is damage
+
+
+def frame(kind: int, content: bytes) -> bytes:
+    """Return a frame of a kind."""
+    head = _FRAME.pack(kind, len(content))
+    return head + content + _CRC.pack(zlib.crc32(content, zlib.crc32(head)))
+
+
+def _frames(content: bytes, at: int) -> Iterator[tuple[int, bytes, int]]:
+    """Yield kind, content and end of every whole frame from ``at`` to the first that is not."""
+    while at + _FRAME.size <= len(content):
+        kind, length = _FRAME.unpack_from(content, at)
+        end = at + _FRAME.size + length + _CRC.size
+        if length > _LARGEST or end > len(content):
+            return
+        (crc,) = _CRC.unpack_from(content, end - _CRC.size)
+        if crc != zlib.crc32(content[at : end - _CRC.size]):
+            return
+        yield kind, content[at + _FRAME.size : end - _CRC.size], end
+        at = end
+
+
+class FlightRecorderTail:
+    """Reads what is new in a flight recording.
+
+    Args:
+        path: The file.
+
+    Attributes:
+        columns: Names of the rows' values; empty until the header is there.
+        header: Facts about the run; empty until the header is there.
+        events: So far, in order.
+
+    Raises:
+        TraceError: The file cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.columns: tuple[str, ...] = ()
+        self.header: dict[str, Any] = {}
+        self.events: list[dict[str, Any]] = []
+        self._rest, self._begun = b"", False
+        try:
+            self._file = path.open("rb", buffering=0)
+        except OSError as error:
+            raise errors.TraceError(f"Cannot read {path}: {error.strerror}.") from error
+
+    @property
+    def over(self) -> bool:
+        """Whether the file is gone: the run has ended and left its trace."""
+        return os.fstat(self._file.fileno()).st_nlink == 0
+
+    @property
+    def whole(self) -> bool:
+        """Whether what was read ends with a whole frame."""
+        return not self._rest
+
+    def rows(self) -> Array:
+        """Return the rows that were written since the last call, (ticks, columns).
+
+        Raises:
+            TraceError: The file is no flight recording.
+        """
+        content = self._rest + self._file.read()
+        at = 0
+        if not self._begun:
+            if not content.startswith(MAGIC[: len(content)]):
+                raise errors.TraceError(f"{self.path} is no flight recording of `hop deploy`.")
+            if len(content) < len(MAGIC):
+                self._rest = content
+                return np.empty((0, 0))
+            at, self._begun = len(MAGIC), True
+        found = []
+        for kind, data, end in _frames(content, at):
+            at = end
+            if kind == HEADER and not self.columns:
+                self._read_header(data)
+            elif kind == ROW and len(data) == 8 * len(self.columns) > 0:
+                found.append(data)
+            elif kind == EVENT and self.columns:
+                self.events.append(parse_json(data, f"{self.path}: an event", errors.TraceError))
+            else:
+                raise errors.TraceError(
+                    f"{self.path} is damaged: it holds a frame of no known kind."
+                )
+        self._rest = content[at:]
+        return np.frombuffer(b"".join(found), "<f8").reshape(len(found), len(self.columns))
+
+    def _read_header(self, data: bytes) -> None:
+        first = parse_json(data, f"{self.path}: the header", errors.TraceError)
+        names: Any = first.get("columns")
+        header: Any = first.get("header")
+        named = isinstance(names, list) and names and all(isinstance(n, str) for n in names)
+        if not (named and len({*names}) == len(names) and isinstance(header, dict)):
+            raise errors.TraceError(f"{self.path} is damaged: its header names no columns.")
+        self.columns, self.header = tuple(names), header
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+def read_recording(path: Path) -> tuple[FlightRecorderTail, Array]:
+    """Return a flight recording and its rows, (ticks, columns), also of a process that was killed.
+
+    Raises:
+        TraceError: The file is missing, or no flight recording.
+    """
+    with contextlib.closing(FlightRecorderTail(path)) as box:
+        rows = box.rows()
+    if not box.columns:
+        raise errors.TraceError(f"{path} ends before its header; the run had not begun.")
+    return box, rows
+
+
+def recover(path: Path) -> trace.Trace:
+    """Return the common trace of a run from its flight recording.
+
+    Columns of the true height, which hardware does not know, hold NaN.
+
+    Raises:
+        TraceError: The file is missing, no flight recording, or holds no tick.
+    """
+    box, rows = read_recording(path)
+    if not len(rows):
+        raise errors.TraceError(f"{path} holds no tick; the run had not begun.")
+    unknown = ("height_m", "height_rate_m_s")
+    clearances = tuple(f"{part}_clearance_m" for part in ("foot", "knee", "base"))
+    missing = [name for name in (*unknown, *clearances) if name not in box.columns]
+    table = pl.DataFrame(dict(zip(box.columns, rows.T, strict=True))).with_columns(
+        pl.lit(float("nan")).alias(name) for name in missing
+    )
+    return trace.Trace(table, {**box.header, "events": box.events})
