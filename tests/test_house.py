@@ -21,7 +21,7 @@ CEILINGS = {
     "src/hopping_leg/sim/**/*.py": (12, 2430),
     "src/hopping_leg/viewer/**/*.py": (6, 1240),
     "src/**/*.py": (189, 30050),
-    "tests/**/*.py": (145, 16300),
+    "tests/**/*.py": (145, 16270),
     "studies/**/*.py": (79, 8190),
     "docs/**/*.md": (22, 2520),
     "docs/live/*.js": (13, 1490),

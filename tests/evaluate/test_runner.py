@@ -151,39 +151,32 @@ class FakePolicy:
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """Two policy files; the training seed is the file's name."""
-    for name in ("1.onnx", "2.onnx"):
-        (tmp_path / name).touch()
+def load(robot, tmp_path, monkeypatch):
+    """Loads files of policies; the training seed is the file's name."""
+    for path in ("1.onnx", "2.onnx", "seed=1/1.onnx", "seed=2/1.onnx"):
+        (tmp_path / path).parent.mkdir(exist_ok=True)
+        (tmp_path / path).touch()
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(runner, "Policy", FakePolicy)
     monkeypatch.setattr(
         runner, "load_controller", lambda name, *_, **__: FakePolicy(int(Path(name).stem))
     )
-    return tmp_path
+    return lambda name: load_entries([name], robot, 200.0)
 
 
-def test_a_pattern_becomes_a_group_with_ranges_and_warnings(robot, folder):
-    found = load_entries([str(folder / "*.onnx")], robot, 200.0)
-    assert [c.label for c in found] == [str(folder / "1.onnx"), str(folder / "2.onnx")]
-    assert {c.group for c in found} == {"fast, 2 training seeds"}
+@pytest.mark.parametrize(
+    ("name", "labels"),
+    [
+        ("*.onnx", ["1.onnx", "2.onnx"]),
+        ("seed*/1.onnx", ["seed=1", "seed=2"]),
+        ("mine=1.onnx", ["mine"]),
+        ("seed=1/1.onnx", ["seed=1/1.onnx"]),
+    ],
+)
+def test_patterns_and_labels_become_entries_with_ranges_and_warnings(load, name, labels):
+    found = load(name)
+    assert [c.label for c in found] == labels
     assert found[0].command_range == (0.2, 0.4)
-    assert "was trained on robot 'other'" in found[0].notes[0]
-
-
-def test_files_of_one_name_go_by_their_folders(robot, folder):
-    for name in ("seed=1", "seed=2"):
-        (folder / name).mkdir()
-        (folder / name / "1.onnx").touch()
-    found = load_entries([str(folder / "seed*" / "1.onnx")], robot, 200.0)
-    assert [c.label for c in found] == ["seed=1", "seed=2"]
-
-
-def test_a_file_can_be_given_a_label(robot, folder):
-    [found] = load_entries([f"mine={folder / '1.onnx'}"], robot, 200.0)
-    assert found.label == "mine"
-    assert found.controller.card.seed == 1
-    assert found.notes[0].startswith("mine was trained")
-    (folder / "a=1").mkdir()  # a path may hold an equals sign, too
-    path = folder / "a=1" / "2.onnx"
-    path.touch()
-    assert [found.label for found in load_entries([str(path)], robot, 200.0)] == [str(path)]
+    assert found[0].notes[0].startswith(f"{labels[0]} was trained on robot 'other'")
+    groups = {c.group for c in found}
+    assert groups == ({"fast, 2 training seeds"} if name == "*.onnx" else {None})

@@ -45,23 +45,31 @@ def test_this_computers_page_alone_is_served_and_only_to_itself(upgrade):
         assert answered.headers["X-Frame-Options"] == "DENY"
 
 
-def test_the_served_page_and_its_websocket_are_guarded():
-    with Served() as (host, port):
-        for name, status in ((f"{host}:{port}", 200), ("elsewhere.example", 403)):
-            connection = http.client.HTTPConnection(host, port, timeout=30)
-            connection.request("GET", "/", headers={"Host": name})
-            assert connection.getresponse().status == status
+@pytest.fixture
+def served():
+    """Host and port of a live simulation's page."""
+    viewer = Viewer(LiveSimulation(("energy-shaping",), "legv2-paper", 0.3), port=0)
+    yield viewer.address.removeprefix("http://").split(":")
+    viewer.close()
 
-        async def knock(origin):
-            async with websockets.connect(
-                f"ws://{host}:{port}", origin=origin, subprotocols=["viser-v0"]
-            ):
-                return True
 
-        assert asyncio.run(knock(f"http://{host}:{port}"))
-        for origin in (None, "http://elsewhere.example"):
-            with pytest.raises(websockets.exceptions.InvalidStatus, match="403"):
-                asyncio.run(knock(origin))
+def test_the_served_page_and_its_websocket_are_guarded(served):
+    host, port = served
+    for name, status in ((f"{host}:{port}", 200), ("elsewhere.example", 403)):
+        connection = http.client.HTTPConnection(host, port, timeout=30)
+        connection.request("GET", "/", headers={"Host": name})
+        assert connection.getresponse().status == status
+
+    async def knock(origin):
+        async with websockets.connect(
+            f"ws://{host}:{port}", origin=origin, subprotocols=["viser-v0"]
+        ):
+            return True
+
+    assert asyncio.run(knock(f"http://{host}:{port}"))
+    for origin in (None, "http://elsewhere.example"):
+        with pytest.raises(websockets.exceptions.InvalidStatus, match="403"):
+            asyncio.run(knock(origin))
 
 
 _KNOCK = """address => new Promise(done => {
@@ -78,30 +86,16 @@ _FRAME = """address => new Promise(done => {
 
 
 @pytest.mark.slow
-def test_a_page_of_another_site_can_neither_read_nor_show_nor_steer_it(foreign):
-    with Served() as (host, port):
-        page, socket = f"http://{host}:{port}", f"ws://{host}:{port}"
-        assert foreign.evaluate(_KNOCK, socket) == "refused"
-        assert foreign.evaluate(_READ, page) == "refused"
-        foreign.evaluate(f"address => void ({_FRAME})(address)", page)
-        foreign.wait_for_timeout(1000)
-        assert not any("viser" in frame.content() for frame in foreign.frames[1:])
-        foreign.goto(page, wait_until="commit")  # its own page may
-        assert foreign.evaluate(_KNOCK, socket) == "open"
-        assert "<html" in foreign.evaluate(_READ, page)
-
-
-class Served:
-    """A live simulation's page."""
-
-    def __enter__(self):
-        live = LiveSimulation(("energy-shaping",), "legv2-paper", 0.3)
-        self.viewer = Viewer(live, port=0)
-        host, port = self.viewer.address.removeprefix("http://").split(":")
-        return host, int(port)
-
-    def __exit__(self, *_):
-        self.viewer.close()
+def test_a_page_of_another_site_can_neither_read_nor_show_nor_steer_it(foreign, served):
+    page, socket = (f"{kind}://{':'.join(served)}" for kind in ("http", "ws"))
+    assert foreign.evaluate(_KNOCK, socket) == "refused"
+    assert foreign.evaluate(_READ, page) == "refused"
+    foreign.evaluate(f"address => void ({_FRAME})(address)", page)
+    foreign.wait_for_timeout(1000)
+    assert not any("viser" in frame.content() for frame in foreign.frames[1:])
+    foreign.goto(page, wait_until="commit")  # its own page may
+    assert foreign.evaluate(_KNOCK, socket) == "open"
+    assert "<html" in foreign.evaluate(_READ, page)
 
 
 ANYTHING = st.none() | st.booleans() | st.floats() | st.text() | st.integers() | st.just("a.py:C")
