@@ -50,7 +50,7 @@ class ObservationHistory(ABC):
         """Forget the past of all legs; the next measurement has ``count`` rows."""
 
     @abstractmethod
-    def restart(self, rows: IntArray, measurement: Measurement) -> None:
+    def restart(self, rows: IntArray | slice, measurement: Measurement) -> None:
         """Forget the past of some legs within a tick: they begin with this measurement."""
 
     @abstractmethod
@@ -82,7 +82,7 @@ class ThreeSamples(ObservationHistory):
         "command": (SAMPLES,),
     }
 
-    def restart(self, rows: IntArray, measurement: Measurement) -> None:
+    def restart(self, rows: IntArray | slice, measurement: Measurement) -> None:
         """Take this tick's measurement."""
         self._measurement = measurement
 
@@ -137,7 +137,7 @@ class Dated(ObservationHistory):
         self._command = np.zeros(count)
         self._fresh = True
 
-    def restart(self, rows: IntArray, measurement: Measurement) -> None:
+    def restart(self, rows: IntArray | slice, measurement: Measurement) -> None:
         """Let the newest sample stand for the past of some legs."""
         self._track.fill(rows, measurement)
         self._torques.frames[:, rows] = 0.0
@@ -147,12 +147,11 @@ class Dated(ObservationHistory):
     def update(self, measurement: Measurement, last_torque: Array) -> None:
         """Put this tick's samples and the last torque in their places."""
         if self._fresh:
-            self._track.fill(slice(None), measurement)
-            self._fresh = False
-        else:
-            self._track.shift()
-            self._torques.shift()
-            self._torques.frames[0] = last_torque
+            self.restart(slice(None), measurement)
+            return
+        self._track.shift()
+        self._torques.shift()
+        self._torques.frames[0] = last_torque
         self._take(measurement)
 
     def _take(self, measurement: Measurement) -> None:

@@ -25,19 +25,15 @@ from hopping_leg.robot import (
     numbers,
     robot_from_tree,
 )
-from hopping_leg.sim.randomization import Range, Twin
+from hopping_leg.sim.randomization import Range, Twin, times
 
 BASE = "legv2"
 """The leg whose size everything is measured by."""
 
 
-def _factor(path: str, low: float, high: float) -> Range:
-    return Range(path, "1", low, high, "[C]", "logarithmic", "factors")
-
-
 SIZES = (
-    *(_factor(f"{link}.length", 0.7, 1.5) for link in ("thigh", "shank")),
-    *(_factor(f"{body}.mass", 0.5, 2.0) for body in ("base", "thigh", "shank")),
+    *(times(f"{link}.length", 0.7, 1.5) for link in ("thigh", "shank")),
+    *(times(f"{body}.mass", 0.5, 2.0) for body in ("base", "thigh", "shank")),
 )
 """Links and masses over leg V2's."""
 
@@ -64,12 +60,12 @@ RUBBING = tuple(
 """Friction of joints that rub more than any fit has found."""
 
 INERTIA = (
-    _factor("thigh.inertia", 0.8, 3.6),
-    _factor("shank.inertia", 0.8, 10.0),
-    _factor("thigh.com", 0.8, 2.2),
-    _factor("shank.com", 0.85, 1.2),
-    _factor("hip.armature", 0.7, 1.9),
-    _factor("knee.armature", 0.6, 2.4),
+    times("thigh.inertia", 0.8, 3.6),
+    times("shank.inertia", 0.8, 10.0),
+    times("thigh.com", 0.8, 2.2),
+    times("shank.com", 0.85, 1.2),
+    times("hip.armature", 0.7, 1.9),
+    times("knee.armature", 0.6, 2.4),
 )
 """What a fit finds, over the CAD: as far off as Table I and the recordings are."""
 
@@ -79,12 +75,12 @@ SMALL_ARMATURE = (
 )
 
 MASSES = (
-    _factor("base.mass", 0.7, 1.6),
-    *(_factor(f"{link}.mass", 0.92, 1.08) for link in ("thigh", "shank")),
+    times("base.mass", 0.7, 1.6),
+    *(times(f"{link}.mass", 0.92, 1.08) for link in ("thigh", "shank")),
 )
 """Payload, and what was not weighed."""
 
-GAINS = tuple(_factor(f"{joint}.torque_gain", 1 / 1.3, 1.3) for joint in JOINTS)
+GAINS = tuple(times(f"{joint}.torque_gain", 1 / 1.3, 1.3) for joint in JOINTS)
 
 TRANSMISSIONS = (
     Range("reality.hip.stiffness", "N m/rad", 600.0, 3000.0, "[C]", "logarithmic"),
@@ -243,8 +239,8 @@ def _scale(base: Robot, rng: np.random.Generator) -> Robot:
         factors["motor.no_load_speed"] = factor(_SPEED) / math.sqrt(length)
         factors["armature"] = mass * length**2 * factor(_GEAR)
         factors["friction"] = factors["damping"] = mass * length
-        for what, times in factors.items():
-            robot = replace_at(robot, f"{name}.{what}", times * attrgetter(f"{name}.{what}")(base))
+        for what, larger in factors.items():
+            robot = replace_at(robot, f"{name}.{what}", larger * attrgetter(f"{name}.{what}")(base))
     return robot
 
 

@@ -123,7 +123,8 @@ IDENTIFIABLE_RANGES = (
 """What the simulator for training knows and a fit can find."""
 
 
-def _times(path: str, low: float, high: float) -> Range:
+def times(path: str, low: float, high: float) -> Range:
+    """Return the range of a number that is multiplied with a factor."""
     return Range(path, "1", low, high, "[C]", "logarithmic", "factors")
 
 
@@ -132,14 +133,14 @@ def _both(name: str, unit: str, low: float, high: float) -> tuple[Range, ...]:
 
 
 WIDE_RANGES = (
-    _times("base.mass", 0.7, 1.6),
-    *(_times(f"{link}.{n}", 0.6, 2.0) for link in ("thigh", "shank") for n in ("mass", "inertia")),
-    _times("rail.friction", 0.3, 6.0),
-    _times("rail.damping", 0.3, 6.0),
-    _times("contact.time_constant", 0.22, 2.8),
-    _times("contact.damping_ratio", 0.4, 2.5),
-    _times("hip.torque_gain", 1 / 1.3, 1.3),
-    _times("knee.torque_gain", 1 / 1.3, 1.3),
+    times("base.mass", 0.7, 1.6),
+    *(times(f"{link}.{n}", 0.6, 2.0) for link in ("thigh", "shank") for n in ("mass", "inertia")),
+    times("rail.friction", 0.3, 6.0),
+    times("rail.damping", 0.3, 6.0),
+    times("contact.time_constant", 0.22, 2.8),
+    times("contact.damping_ratio", 0.4, 2.5),
+    times("hip.torque_gain", 1 / 1.3, 1.3),
+    times("knee.torque_gain", 1 / 1.3, 1.3),
     *_both("friction", "N m", 0.0, 1.4),
     Range("reality.latency.command", "s", 0.0, 0.0149, "[C]", bounds="additions", step=5e-3),
 )
