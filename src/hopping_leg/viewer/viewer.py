@@ -13,7 +13,6 @@ import io
 import math
 import time
 from collections.abc import Callable, Iterator
-from importlib import resources
 from typing import Any
 from unittest.mock import patch
 from urllib.parse import urlsplit
@@ -36,7 +35,6 @@ _SLOW = 6
 _NOTICE_SECONDS = 8.0
 _SLOW_BROWSER = "webgl-software-rendering"
 """viser's name of its notice of a slow browser."""
-_RESOLUTION = (resources.files("hopping_leg.viewer") / "resolution.js").read_text(encoding="utf-8")
 
 
 class Viewer:
@@ -74,7 +72,6 @@ class Viewer:
         self._scene = scene.Scene(self._server, panel.add_tab("Last seconds"))
         panel.dock_right()
         panel.set_width(390)
-        self._server.on_client_connect(_adapt_resolution)
         self.frames = 0
         self._stopped = False
 
@@ -97,7 +94,8 @@ class Viewer:
         if turn == _SLOW - 1:
             self._status.content = self._text()
             for client in self._server.get_clients().values():  # it may cover a leg at any time
-                _send(client, _messages.RemoveNotificationMessage(_SLOW_BROWSER))
+                notice = _messages.RemoveNotificationMessage(_SLOW_BROWSER)
+                client._websock_connection.queue_message(notice)
             if self._replay_panel is not None:
                 self._replay_panel.show()
             self._notify(source.notices)
@@ -132,16 +130,6 @@ class Viewer:
             lines += [html.escape(track.note)] if track.note else []
         lines += [f'<span style="color:#77767b">{source.now:.2f} s</span>']
         return f'<div style="padding:0.4em 1em;line-height:1.5">{"<br>".join(lines)}</div>'
-
-
-def _adapt_resolution(client: viser.ClientHandle) -> None:
-    """Let a page draw as many pixels as its browser keeps up with."""
-    _send(client, _messages.RunJavascriptMessage(_RESOLUTION))
-
-
-def _send(client: viser.ClientHandle, message: _messages.Message) -> None:
-    """Send a page what viser has no public call for."""
-    client._websock_connection.queue_message(message)
 
 
 def _serve(port: int) -> viser.ViserServer:
