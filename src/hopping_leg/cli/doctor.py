@@ -10,12 +10,10 @@ Examples:
   hop doctor --transport socketcan:can0 --home 0.0 0.0     # the leg hangs straight down
 """
 
-from collections.abc import Sequence
+import re
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import distributions, requires
 from typing import TYPE_CHECKING
-
-from packaging.requirements import Requirement
 
 from hopping_leg.cli import motors, options
 from hopping_leg.deploy import preflight, safety_limits
@@ -59,9 +57,10 @@ def run(args: Doctor) -> None:
     if args.transport is None:
         if changes:
             raise UsageError("--write and --home need the drives; name their --transport.")
-        for extra, missing in missing_requirements(requires("hopping-leg") or []).items():
+        for extra, purpose in PURPOSES.items():
+            missing = missing_packages(extra)
             state = f"missing {', '.join(missing)}" if missing else "installed"
-            options.say(f"{extra}: {state}; {PURPOSES[extra]}")
+            options.say(f"{extra}: {state}; {purpose}")
             if missing:
                 options.say(f"  pip install 'hopping-leg[{extra}]'")
         from hopping_leg.sim.compiled import FOLDER
@@ -124,30 +123,8 @@ def _write(
             configure(link, joint, settings)
 
 
-def missing_requirements(requirements: Sequence[str]) -> dict[str, list[str]]:
-    """Return what of each extra's requirements is absent or of a version that does not fit."""
-    wanted = [*map(Requirement, requirements)]
-    found: dict[str, list[str]] = {extra: [] for extra in PURPOSES}
-    for extra, missing in found.items():
-        for r in wanted:
-            if _belongs(r, extra) and not _met(r):
-                brings = f"[{','.join(sorted(r.extras))}]" if r.extras else ""
-                missing.append(f"{r.name}{brings}{r.specifier}")
-    return found
-
-
-def _belongs(requirement: Requirement, extra: str) -> bool:
-    """Tell whether an extra asks for a requirement, which holds on this platform."""
-    holds = requirement.marker and requirement.marker.evaluate
-    return bool(holds and holds({"extra": extra}) and not holds({"extra": ""}))
-
-
-def _met(requirement: Requirement) -> bool:
-    try:
-        found = version(requirement.name)
-    except PackageNotFoundError:
-        return False
-    brought = [Requirement(line) for line in requires(requirement.name) or []]
-    return requirement.specifier.contains(found, prereleases=True) and all(
-        _met(other) for extra in requirement.extras for other in brought if _belongs(other, extra)
-    )
+def missing_packages(extra: str) -> list[str]:
+    """Return what an extra brings and is not installed."""
+    asked = [r for r in requires("hopping-leg") or () if r.endswith(f"extra == '{extra}'")]
+    names = [re.split(r"[^\w.-]", requirement)[0] for requirement in asked]
+    return [name for name in names if not any(distributions(name=name))]

@@ -55,16 +55,10 @@ def going_on(how: str) -> Iterator[None]:
     """Say how to go on where work is interrupted, or something cannot be written."""
     try:
         yield
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, OSError, TraceError):
         with contextlib.suppress(OSError):  # the terminal may be gone
             print(f"Stopped; {how}", file=sys.stderr)
         raise
-    except OSError as error:
-        where = f" {error.filename}" if error.filename else ""
-        why = error.strerror or error
-        raise TraceError(f"Cannot use{where}: {why}; once that is mended, {how}") from error
-    except TraceError as error:
-        raise TraceError(f"{error} Once that is mended, {how}") from error
 
 
 def mm(metres: float | None) -> str:

@@ -24,7 +24,7 @@ from hopping_leg import io
 from hopping_leg.cli import options
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import Robot, load_robot, parent_robot
-from hopping_leg.terminal import Progress
+from hopping_leg.terminal import Progress, plain_console
 
 if TYPE_CHECKING:
     from hopping_leg.evaluate import EvaluationRun
@@ -103,14 +103,7 @@ def run(args: Reproduce) -> None:
         ),
         notes,
     )
-    options.show_table(
-        (f"on {twin.name}", "command, m", "error, mm", "std, mm", "hops", "skipped"),
-        (
-            (row.controller, f"{row.command_m:.2f}", tables.millimetres(row.median_error_m, True),
-             tables.millimetres(row.std_m), row.hops, row.skipped_hops)
-            for row in judged.summary
-        ),
-    )  # fmt: skip
+    tables.print_evaluation(plain_console(), judged)
     options.say(
         *notes,
         f"Done in {(time.monotonic() - start) / 60:.1f} minutes.",

@@ -11,7 +11,6 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Literal
 
 import mujoco
 import numpy as np
@@ -23,7 +22,6 @@ from hopping_leg.hop_detection import trace_hops
 from hopping_leg.robot import Robot, get_spec
 from hopping_leg.trace import Trace
 
-Animation = Literal["webp", "gif"]
 CLIP_SECONDS = 1.2
 FRAME_RATE = 33.3  # frames per second of simulated time
 SLOWDOWN = 2.0
@@ -60,9 +58,7 @@ def fixed_traces(runs: Sequence[trials.Run], controller: str) -> dict[float, Tra
     }
 
 
-def render_hops(
-    robot: Robot, who: str, colour: str, traces: Mapping[float, Trace], kind: Animation = "webp"
-) -> Video:
+def render_hops(robot: Robot, who: str, colour: str, traces: Mapping[float, Trace]) -> Video:
     """Render the first hop that counts of a controller's runs side by side, at half speed."""
     clips = []
     for trace in traces.values():
@@ -71,7 +67,7 @@ def render_hops(
         settled = apexes[apexes >= metrics.START_SECONDS]
         start = float(settled[0] if len(settled) else min(metrics.START_SECONDS, time[-1]))
         clips.append(Clip(who, colour, sample(trace, start, CLIP_SECONDS)))
-    return render_clips(robot, clips, 1000 * SLOWDOWN / FRAME_RATE, kind)
+    return render_clips(robot, clips, 1000 * SLOWDOWN / FRAME_RATE)
 
 
 def sample(
@@ -87,13 +83,11 @@ def sample(
     return rows
 
 
-def render_clips(
-    robot: Robot, clips: Sequence[Clip], milliseconds: float, kind: Animation = "webp"
-) -> Video:
+def render_clips(robot: Robot, clips: Sequence[Clip], milliseconds: float) -> Video:
     """Render clips of the same length side by side, each frame shown so long."""
     spec = get_spec(robot)
     spec.compile()
-    asked = {"leg": spec.to_xml(), "clips": [asdict(clip) for clip in clips], "kind": kind}
+    asked = {"leg": spec.to_xml(), "clips": [asdict(clip) for clip in clips]}
     try:
         done = subprocess.run(
             [sys.executable, "-m", "hopping_leg.evaluate.video"],
@@ -120,7 +114,7 @@ def _main() -> None:
     first, *others = _draw_frames(mujoco.MjModel.from_xml_string(asked["leg"]), clips)
     look = {"duration": asked["milliseconds"], "loop": 0, "quality": 60}
     content = io.BytesIO()
-    first.save(content, asked["kind"], save_all=True, append_images=others, **look)
+    first.save(content, "webp", save_all=True, append_images=others, **look)
     sys.stdout.buffer.write(content.getvalue())
 
 
