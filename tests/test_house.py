@@ -23,7 +23,7 @@ CEILINGS = {
     "src/**/*.py": (189, 29960),
     "tests/**/*.py": (145, 16250),
     "studies/**/*.py": (79, 8190),
-    "docs/**/*.md": (22, 2520),
+    "docs/**/*.md": (22, 2510),
     "docs/live/*.js": (13, 1490),
 }
 """Files and lines at most. Who raises one says what users gain by it."""
