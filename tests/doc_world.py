@@ -108,7 +108,7 @@ def _trained_policy() -> None:
 
 def _bag_trial_and_policy() -> None:
     """Leave what is not made here: a trial, a recording as a bag, and a policy."""
-    from hopping_leg.formats.mcap_writer import to_mcap
+    from hopping_leg.formats import to_mcap
     from hopping_leg.identify.excitation import Multisine, make_excitation
     from hopping_leg.identify.play_excitation import play
 

@@ -223,11 +223,11 @@ def _recordings(form):
 
 
 def _bags(form):
-    from hopping_leg.formats.mcap_writer import to_mcap
+    from hopping_leg.formats import to_mcap
     from hopping_leg.identify.recording import load_recording
     from hopping_leg.trace import Trace
-    from tests.formats.test_bags import record
     from tests.identify.runs import SIDECAR
+    from tests.test_formats import record
 
     if form == "mcap":
         files = {"run.toml": SIDECAR.encode(), "run.mcap": to_mcap(Trace(_table()))}

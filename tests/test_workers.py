@@ -107,7 +107,6 @@ def test_a_cluster_does_the_same_and_a_worker_that_dies_begins_again(tmp_path):
     with local():
         cluster = RayWorkers("local")
         check_contract(cluster)
-        assert cluster.elsewhere == []
         assert RayWorkers().map(die_once, [(tmp_path / "mark",)]) == ["lived"]
 
 

@@ -71,17 +71,7 @@ def parse_json(
     content: bytes | str, origin: str, error: type[HoppingLegError] = UsageError
 ) -> Tree:
     """Return the object that JSON holds; ``error`` says that it is damaged or no object."""
-    return _parse(_read_json, content, origin, "readable as JSON", error)
-
-
-def _read_json(content: bytes | str) -> object:
-    return json.loads(content, parse_int=_read_int)
-
-
-def _read_int(text: str) -> int:
-    if len(text) > _MOST_DIGITS:
-        raise ValueError(f"a number of {len(text)} digits")
-    return int(text)
+    return _parse(json.loads, content, origin, "readable as JSON", error)
 
 
 def parse_toml(content: bytes, origin: str, error: type[HoppingLegError] = UsageError) -> Tree:

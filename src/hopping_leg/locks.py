@@ -3,7 +3,6 @@
 import contextlib
 import fcntl
 import os
-import socket
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,18 +26,12 @@ def named_lock(name: str, what: str, error: type[HoppingLegError]) -> BaseFileLo
 
 @contextlib.contextmanager
 def hold_folder(folder: Path, error: type[HoppingLegError]) -> Iterator[None]:
-    """Let no other process work in a folder meanwhile.
-
-    Raises:
-        HoppingLegError: ``error``, which names the process and host that hold it.
-    """
+    """Let no other process work in a folder meanwhile; where one does raise ``error``."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
         raise error(f"{folder} cannot be made a folder: {problem.strerror}.") from problem
-    file = folder / FOLDER_LOCK
-    with _held(file, str(folder), error):
-        file.write_text(f"process {os.getpid()} on {socket.gethostname()}\n", encoding="utf-8")
+    with _held(folder / FOLDER_LOCK, str(folder), error):
         yield
 
 
@@ -47,8 +40,7 @@ def _held(file: Path, what: str, error: type[HoppingLegError]) -> BaseFileLock:
     try:
         lock.acquire()
     except Timeout:
-        holder = file.read_text(encoding="utf-8", errors="replace").strip() or "another process"
-        raise error(f"{what} is in use by {holder}; end that first.") from None
+        raise error(f"{what} is in use by another process; end that first.") from None
     except OSError as problem:
         raise error(f"Cannot open {file}: {problem.strerror}.") from problem
     return lock
@@ -62,15 +54,11 @@ class DeviceLock:
             self._descriptor = os.open(path, os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError as problem:
             raise error(f"Cannot open {path}: {problem.strerror}.") from problem
-        others = []
+        others = [*_holders(self._descriptor)] if os.isatty(self._descriptor) else []
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            others = ["another process, or this one"]
-        terminal = os.isatty(self._descriptor)
-        if others or terminal:
-            known = list(_holders(os.fstat(self._descriptor), served=terminal))
-            others = known or others
+            others = others or ["another process, or this one"]
         if others:
             self.close()
             raise error(f"{path} is in use by {' and '.join(others)}; end that first.")
@@ -82,27 +70,14 @@ class DeviceLock:
             self._descriptor = -1
 
 
-def _holders(sought: os.stat_result, *, served: bool) -> Iterator[str]:
-    """Yield the other processes that have a file open, but for whoever serves it if it is."""
+def _holders(terminal: int) -> Iterator[str]:
+    """Yield the other processes that have a terminal open, but for the one that serves it."""
+    sought = os.ttyname(terminal)
     for process in Path("/proc").glob("[0-9]*"):
-        if process.name == str(os.getpid()):
-            continue
         with contextlib.suppress(OSError):  # it ended, or is another user's
-            opened = list((process / "fd").iterdir())
-            serves = served and any(_target(entry) in _MASTERS for entry in opened)
-            if not serves and any(_same(entry, sought) for entry in opened):
+            opened = {str(entry.readlink()) for entry in (process / "fd").iterdir()}
+            own = process.name == str(os.getpid())
+            if sought in opened and not own and not opened.intersection(_MASTERS):
                 words = (process / "cmdline").read_bytes().replace(b"\0", b" ")
                 text = words.decode(errors="replace").strip()
                 yield f"process {process.name} ({text[:80]})"
-
-
-def _target(entry: Path) -> str:
-    with contextlib.suppress(OSError):
-        return str(entry.readlink())
-    return ""
-
-
-def _same(entry: Path, sought: os.stat_result) -> bool:
-    with contextlib.suppress(OSError):
-        return os.path.samestat(entry.stat(), sought)
-    return False

@@ -5,11 +5,10 @@ import signal
 import socket
 import threading
 from collections.abc import Callable, Iterable
-from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
+from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from types import TracebackType
 from typing import Any, ParamSpec, Protocol, Self, TypeVar
 
 import numpy as np
@@ -21,7 +20,6 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 _PATIENCE = 5.0  # how long an address may take to answer, s
-_LOOK_EVERY = 0.5  # between two looks for an interruption, s
 
 
 class Workers(Protocol):
@@ -77,26 +75,16 @@ class ProcessWorkers:
         if self.count == 1:
             return [function(*values) for values in arguments]
         futures = [self.submit(function, *values) for values in arguments]
-        left = set(futures)
-        while left:
-            # A signal that another thread takes does not end an endless wait.
-            done, left = wait(left, _LOOK_EVERY, FIRST_EXCEPTION)
-            for future in done:
-                if isinstance(error := future.exception(), BrokenProcessPool):
-                    raise UsageError(
-                        "A worker ended early; call the same command again to go on."
-                    ) from error
-                future.result()
-        return [future.result() for future in futures]
+        try:
+            return [future.result() for future in futures]
+        except BrokenProcessPool as error:
+            raise UsageError(
+                "A worker ended early; call the same command again to go on."
+            ) from error
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """End the processes, and what they do if an error ends the work."""
-        self._pool.shutdown(wait=error is None, cancel_futures=True)
+        self._pool.shutdown(wait=kind is None, cancel_futures=True)
         self._alive.close()
 
 
@@ -124,35 +112,36 @@ class RayWorkers:
     """
 
     def __init__(self, address: str | None = None, count: int | None = None) -> None:
-        self._ray = _import_ray()
-        self._sent: tuple[object, object] = (None, None)
-        if not self._ray.is_initialized():
+        # Otherwise a cluster that is started here tells its makers about itself.
+        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+        try:
+            import ray
+        except ModuleNotFoundError as error:
+            raise UsageError(
+                "A cluster needs Ray; install it with `pip install 'hopping-leg[cluster]'`."
+            ) from error
+        self._ray = ray
+        if not ray.is_initialized():
             try:
                 _knock(address)
-                self._ray.init(address=address or "local", log_to_driver=False)
+                ray.init(address=address or "local", log_to_driver=False)
             except (OSError, ValueError, RuntimeError) as error:
-                raise UsageError(_unreached(address, str(error).rstrip("."))) from error
-        self.count = count or max(1, int(self._ray.cluster_resources().get("CPU", 1)))
-
-    @property
-    def elsewhere(self) -> list[str]:
-        """Names of its machines other than this one."""
-        names = {n["NodeManagerHostname"] for n in self._ray.nodes() if n["Alive"]}
-        return sorted(names - {socket.gethostname()})
+                raise UsageError(
+                    f"There is no Ray cluster at {address or 'local'}: {str(error).rstrip('.')};"
+                    " start one with `ray start --head`, or leave the address out."
+                ) from error
+        self.count = count or max(1, int(ray.cluster_resources().get("CPU", 1)))
 
     def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> list[R]:
-        """See ``Workers``; a task that dies begins again, and a function is sent once."""
-        exceptions = self._ray.exceptions
-        if self._sent[0] is not function:
-            self._sent = function, self._ray.put(function)
-        task = self._ray.remote(_call)
+        """See ``Workers``; a task that dies begins again, and the function is sent once."""
+        sent, task = self._ray.put(function), self._ray.remote(_call)
         try:
-            return list(self._ray.get([task.remote(self._sent[1], *v) for v in arguments]))
-        except exceptions.RayTaskError as error:
+            return list(self._ray.get([task.remote(sent, *values) for values in arguments]))
+        except self._ray.exceptions.RayTaskError as error:
             if isinstance(error.cause, HoppingLegError):
                 raise error.cause from None
             raise
-        except exceptions.RayError as error:
+        except self._ray.exceptions.RayError as error:
             raise UsageError(
                 f"A worker of the Ray cluster died: {str(error).splitlines()[0].rstrip('.')}; call"
                 " the same command again to go on."
@@ -163,29 +152,8 @@ def _call(function: Callable[..., Any], *values: Any) -> Any:  # noqa: ANN401
     return function(*values)
 
 
-def _unreached(address: str | None, why: str) -> str:
-    if address in (None, "local"):
-        return f"Ray does not start on this machine: {why}; name a cluster by its address instead."
-    return (
-        f"There is no Ray cluster at {address}: {why}; start one with `ray start --head`, or leave"
-        " the address out."
-    )
-
-
 def _knock(address: str | None) -> None:
     """Fail at once with an OSError where nothing answers; Ray itself would try for minutes."""
     host, _, port = (address or "").removeprefix("ray://").rpartition(":")
     if host and port.isdigit():
         socket.create_connection((host, int(port)), _PATIENCE).close()
-
-
-def _import_ray() -> Any:  # noqa: ANN401
-    # Otherwise a cluster that is started here tells its makers about itself.
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-    try:
-        import ray
-    except ModuleNotFoundError as error:
-        raise UsageError(
-            "A cluster needs Ray; install it with `pip install 'hopping-leg[cluster]'`."
-        ) from error
-    return ray

@@ -67,7 +67,7 @@ def run(args: Urdf | Policy | Traces) -> None:
 def _export(args: Traces) -> None:
     if not args.traces:
         raise UsageError("No trace was named; record some with `hop evaluate ... --traces DIR`.")
-    from hopping_leg.formats.mcap_writer import to_mcap
+    from hopping_leg.formats import to_mcap
 
     for path in args.traces:
         trace = recover(path) if path.suffix == SUFFIX else Trace.load(path)

@@ -1,1 +1,236 @@
-"""Traces in the files of other tools: ROS 2 bags and MCAP."""
+"""ROS 2 bags and MCAP files: traces are written for other tools, what those record is read.
+
+Measured joints are ``sensor_msgs/JointState`` on ``/joint_states``, their commands the same on
+``/joint_commands``; every other number of a trace is a ``std_msgs/Float64`` on the topic of its
+column. Joints are named as in the leg's URDF; the rail's position is the base height. Times are
+those of the trace, from the start of the run; they are both the header's stamp and the time of the
+log.
+
+A bag, an MCAP file or rosbag2's folders and files in SQLite (.db3), becomes a table without ROS: a
+row is a message of one topic of ``sensor_msgs/JointState``; of all other topics it has the newest
+message that was logged by then. Columns are called after topic, joint and quantity, as in
+``joint_states/hip.position``, numbers of ``std_msgs/Float64`` after their topic.
+"""
+
+import io
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from hopping_leg.arrays import Array
+from hopping_leg.errors import RecordingError, TraceError
+from hopping_leg.io import Tree, parse_json
+from hopping_leg.trace import SCHEMA, Trace
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+FLOAT = "std_msgs/msg/Float64"
+
+DEFINITIONS = {
+    JOINT_STATE: """\
+std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+""",
+    FLOAT: "float64 data\n",
+}
+"""Fields of the messages that are written and read, as ROS 2 defines them."""
+
+STATES = "joint_states"
+COMMANDS = "joint_commands"
+QUANTITIES = ("position", "velocity", "effort")
+"""Arrays of a ``JointState``."""
+
+COLUMNS = {
+    STATES: {
+        "rail": ("height_m", "height_rate_m_s", ""),
+        "hip": ("hip_position_rad", "hip_velocity_rad_s", "hip_torque_nm"),
+        "knee": ("knee_position_rad", "knee_velocity_rad_s", "knee_torque_nm"),
+    },
+    COMMANDS: {
+        joint: (
+            f"{joint}_position_command_rad",
+            f"{joint}_velocity_command_rad_s",
+            f"{joint}_command_nm",
+        )
+        for joint in ("hip", "knee")
+    },
+}
+"""Columns of a trace or recording by topic and joint, in the order of ``QUANTITIES``."""
+
+NAMES = {
+    column: f"{topic}/{joint}.{quantity}"
+    for topic, joints in COLUMNS.items()
+    for joint, columns in joints.items()
+    for quantity, column in zip(QUANTITIES, columns, strict=True)
+    if column
+}
+"""What a bag's own columns are called for each of a recording's."""
+
+KEY = "hopping_leg"
+"""Metadata record of an MCAP file that holds a trace's header as JSON."""
+
+_MCAP, _SQLITE = b"\x89MCAP0\r\n", b"SQLite format 3\0"
+_LOGGED, _STAMP = "/logged", "/stamp"  # columns of times, ns; no topic is called so
+
+Rows = dict[str, list[Tree]]
+"""What was logged on each topic, a row a message."""
+
+
+def to_mcap(trace: Trace) -> bytes:
+    """Return a trace as an MCAP file; what is missing in a column is NaN.
+
+    Raises:
+        TraceError: The trace has no time, or one before 1970.
+    """
+    from mcap_ros2.writer import Writer
+
+    stamps = np.rint(1e9 * trace.column("time_s"))
+    if not (np.isfinite(stamps) & (stamps >= 0)).all():
+        raise TraceError(
+            "The trace's 'time_s' must be 0 or more in every row to be written as MCAP."
+        )
+    content = io.BytesIO()
+    with Writer(content) as writer:
+        header = json.dumps({"schema": SCHEMA, **trace.header}, sort_keys=True)
+        writer.add_metadata(KEY, {"header": header})
+        kinds = {name: writer.register_msgdef(name, text) for name, text in DEFINITIONS.items()}
+        numbers = {name: trace.column(name) for name in trace.numbers}
+        joints = {topic: _joints(numbers, of) for topic, of in COLUMNS.items()}
+        used = {c for columns in COLUMNS.values() for triple in columns.values() for c in triple}
+        others = [name for name in numbers if name not in used and name != "time_s"]
+        for row, stamp in enumerate(map(int, stamps)):
+            seconds, rest = divmod(stamp, 10**9)
+            head = {"stamp": {"sec": seconds, "nanosec": rest}, "frame_id": ""}
+            for topic, arrays in joints.items():
+                if arrays["name"]:
+                    values = {q: arrays[q][row].tolist() for q in QUANTITIES}
+                    message = {"header": head, "name": arrays["name"], **values}
+                    writer.write_message(f"/{topic}", kinds[JOINT_STATE], message, stamp)
+            for name in others:
+                message = {"data": numbers[name][row]}
+                writer.write_message(f"/{name}", kinds[FLOAT], message, stamp)
+    return content.getvalue()
+
+
+def _joints(
+    numbers: dict[str, Array], columns: Mapping[str, tuple[str, str, str]]
+) -> dict[str, Any]:
+    """Return the joints that have any value, and their arrays, (rows, joints) or (rows, 0)."""
+    have = [
+        joint
+        for joint, triple in columns.items()
+        if any(c in numbers and np.isfinite(numbers[c]).any() for c in triple)
+    ]
+    rows = len(numbers["time_s"])
+    found: dict[str, Any] = {"name": have}
+    for index, quantity in enumerate(QUANTITIES):
+        wanted = [numbers.get(columns[joint][index], np.full(rows, np.nan)) for joint in have]
+        stacked = np.stack(wanted, axis=1) if have else np.empty((rows, 0))
+        found[quantity] = stacked if np.isfinite(stacked).any() else np.empty((rows, 0))
+    return found
+
+
+def bag_files(path: Path) -> list[Path]:
+    """Return the files of a bag; none where a path is no bag.
+
+    Raises:
+        OSError: It cannot be read.
+    """
+    if path.is_dir():
+        return sorted(file for file in path.iterdir() if {".mcap", ".db3"} & {*file.suffixes})
+    with path.open("rb") as file:
+        return [path] if file.read(len(_SQLITE)).startswith((_MCAP, _SQLITE)) else []
+
+
+def read_bag(path: Path, origin: str) -> tuple[pl.DataFrame, Tree]:
+    """Return the joints of a bag as a table; of one that was made of a trace also its header.
+
+    The table has ``time_s``, counted from the whole second of the first row, and the columns of a
+    trace where topics and joints are called as in ``COLUMNS``.
+
+    Raises:
+        RecordingError: The bag is damaged or holds no joint states.
+    """
+    try:
+        states, numbers = _messages(path)
+        header = _header(path, origin) if path.suffix == ".mcap" else {}
+        table = _join(states, numbers) if states else None
+    except (ModuleNotFoundError, RecordingError):
+        raise
+    except Exception as error:  # readers raise many unrelated types where a file is damaged
+        raise RecordingError(
+            f"{origin} is no whole bag ({type(error).__name__}: {error}); `mcap recover` or"
+            " `ros2 bag reindex` may mend it."
+        ) from error
+    if table is None:
+        raise RecordingError(
+            f"{origin} holds no message of {JOINT_STATE}; record the topic that has the joints."
+        )
+    named = [pl.col(own).alias(name) for name, own in NAMES.items() if own in table]
+    return table.with_columns(named), header
+
+
+def _messages(path: Path) -> tuple[Rows, Rows]:
+    """Return the rows of joint states and of numbers, by topic."""
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    states: Rows = {}
+    numbers: Rows = {}
+    with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
+        wanted = [c for c in bag.connections if c.msgtype in (JOINT_STATE, FLOAT)]
+        for connection, time, raw in bag.messages(wanted) if wanted else ():
+            name = connection.topic.strip("/")
+            message: Any = bag.deserialize(raw, connection.msgtype)
+            if connection.msgtype == FLOAT:
+                numbers.setdefault(name, []).append({_LOGGED: time, name: message.data})
+                continue
+            stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+            row = {_LOGGED: time, _STAMP: stamp or time}
+            for quantity in QUANTITIES:
+                for joint, value in zip(message.name, getattr(message, quantity), strict=False):
+                    row[f"{name}/{joint}.{quantity}"] = float(value)
+            states.setdefault(name, []).append(row)
+    return states, numbers
+
+
+def _header(file: Path, origin: str) -> Tree:
+    """Return the header of the trace that a file was made of, empty for others."""
+    from mcap.reader import SeekingReader
+
+    with file.open("rb") as stream:
+        for entry in SeekingReader(stream).iter_metadata():
+            if entry.name == KEY:
+                text = entry.metadata["header"]
+                header = parse_json(text, f"{origin}: its header", RecordingError)
+                del header["schema"]
+                return header
+    return {}
+
+
+def _join(states: Rows, numbers: Rows) -> pl.DataFrame:
+    """Return the measured joints with what was logged beside them."""
+    measured = max(states, key=lambda topic: (topic.endswith(STATES), len(states[topic])))
+    table = _table(states.pop(measured))
+    for rows in [*states.values(), *numbers.values()]:
+        table = table.join_asof(_table(rows).drop(_STAMP, strict=False), on=_LOGGED)
+    stamp = pl.col(_STAMP) - pl.col(_STAMP).first() // 10**9 * 10**9
+    return table.select((stamp / 1e9).alias("time_s"), pl.exclude(_LOGGED, _STAMP))
+
+
+def _table(rows: list[Tree]) -> pl.DataFrame:
+    return pl.DataFrame(rows, infer_schema_length=None).sort(_LOGGED, maintain_order=True)

@@ -18,7 +18,7 @@ import polars as pl
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import RecordingError, UsageError, unknown_name
-from hopping_leg.formats import bag_reader
+from hopping_leg.formats import bag_files, read_bag
 from hopping_leg.identify import importers, recording_checks
 from hopping_leg.identify.recording_format import COLUMNS, PAIRS, RecordingMetadata, float_column
 from hopping_leg.io import parse_toml, read_dataclass
@@ -164,7 +164,7 @@ def _read(path: Path, origin: str) -> tuple[pl.DataFrame, dict[str, Any], str]:
     """Return a file's or bag's own table, its header, and the SHA-256 of its bytes."""
     try:
         bag = path.is_dir() or path.suffix in _BAGS
-        files = bag_reader.bag_files(path) if bag else []
+        files = bag_files(path) if bag else []
         content = b"".join(file.read_bytes() for file in files or [path])
     except FileNotFoundError as error:
         raise RecordingError(f"There is no recording {path}.") from error
@@ -174,7 +174,7 @@ def _read(path: Path, origin: str) -> tuple[pl.DataFrame, dict[str, Any], str]:
         raise RecordingError(f"Cannot read the recording {path}: {error.strerror}.") from error
     digest = hashlib.sha256(content).hexdigest()
     if files:
-        return *bag_reader.read_bag(path, origin), digest
+        return *read_bag(path, origin), digest
     if content.startswith(_PARQUET):
         return *_native(path, content), digest
     return _read_csv(content, origin), {}, digest

@@ -8,18 +8,29 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hopping_leg.cli import main
 from hopping_leg.errors import RecordingError, TraceError
-from hopping_leg.formats.bag_reader import bag_files, read_bag
-from hopping_leg.formats.ros_messages import COLUMNS, DEFINITIONS, JOINT_STATE, STATES
+from hopping_leg.formats import COLUMNS, DEFINITIONS, JOINT_STATE, STATES, bag_files, read_bag
 from hopping_leg.identify.recording import Recording, load_recording
+from hopping_leg.robot import load_robot
+from hopping_leg.trace import COLUMNS as TRACED
 from hopping_leg.trace import Trace
-from tests.formats.traces import noise
+from tests.extras import run_without
 from tests.identify.runs import METADATA, SIDECAR, swinging
 
 pytest.importorskip("mcap_ros2", reason="the extra 'ros' is not installed")
-from hopping_leg.formats.mcap_writer import to_mcap
+from hopping_leg.formats import to_mcap
 
 JOINTS = [c for of in COLUMNS.values() for triple in of.values() for c in triple if c]
+
+
+def noise(rows=40, seed=0, rate=200.0, robot="legv2", command=0.3):
+    """Return a trace of random numbers, all columns there."""
+    rng = np.random.default_rng(seed)
+    columns = {name: rng.normal(size=rows) for name in TRACED}
+    columns |= {"time_s": np.arange(rows) / rate, "command_m": np.full(rows, command)}
+    header = {"robot": robot, "robot_digest": load_robot(robot).digest, "rate_hz": rate}
+    return Trace(pl.DataFrame(columns), header)
 
 
 def read(path):
@@ -182,3 +193,26 @@ def test_message_definitions_are_those_of_ros():
     for name, text in DEFINITIONS.items():
         for kind, fields in get_types_from_msg(text, name).items():
             assert store.fielddefs[kind] == fields, kind
+
+
+@pytest.fixture
+def trace(tmp_path):
+    path = tmp_path / "run.parquet"
+    noise(robot="legv2").save(path)
+    return path
+
+
+def test_a_file_lies_beside_its_trace_or_in_a_folder(trace, tmp_path):
+    assert main(["export", "traces", str(trace)]) == 0
+    assert (tmp_path / "run.mcap").stat().st_size > 1000
+    assert main(["export", "traces", str(trace), "--out", str(tmp_path / "out")]) == 0
+    assert (tmp_path / "out/run.mcap").exists()
+
+
+def test_a_missing_extra_is_named_with_the_command_that_installs_it(trace):
+    words = ["export", "traces", str(trace)]
+    code = f"from hopping_leg.cli import main; sys.exit(main({words}))"
+    found = run_without(("mcap", "mcap_ros2"), code)
+    assert found.returncode == 2
+    assert "pip install 'hopping-leg[ros]'" in found.stderr
+    assert "Traceback" not in found.stderr
