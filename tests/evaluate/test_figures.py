@@ -10,8 +10,8 @@ from hopping_leg.evaluate import figures as drawing
 from hopping_leg.evaluate import metrics
 from hopping_leg.evaluate.report import draw_report_figures
 from hopping_leg.evaluate.trials import load_run, save_traces
-from hopping_leg.evaluate.video import CLIP_SECONDS, FRAME_RATE, fixed_traces, render_hops, sample
-from hopping_leg.figures import COLOURS, controller_colours, encode, to_svg
+from hopping_leg.evaluate.video import CLIP_SECONDS, FRAME_RATE, render_videos, sample
+from hopping_leg.figures import controller_colours, encode, to_svg
 from hopping_leg.hop_detection import find_hops
 from hopping_leg.trace import Trace
 
@@ -94,31 +94,25 @@ def test_the_same_figure_has_the_same_bytes_whatever_the_format():
         assert encode(figure, kind) == encode(figure, kind)
 
 
-@pytest.fixture(scope="module")
-def traces(judged):
-    return fixed_traces(judged.runs, judged.evaluation.controllers[0])
-
-
-def test_a_clip_has_the_poses_of_the_run_at_its_frames(traces):
-    trace = traces[0.35]
-    poses = np.array(sample(trace, 3.0, CLIP_SECONDS, rate=100))
-    start = int(np.searchsorted(trace.column("time_s"), 3.0 - 1e-9))
+def test_a_clip_has_the_poses_of_the_run_at_its_frames(fixed):
+    poses = np.array(sample(fixed, 3.0, CLIP_SECONDS, rate=100))
+    start = int(np.searchsorted(fixed.column("time_s"), 3.0 - 1e-9))
     ticks = slice(start, start + 2 * len(poses), 2)
     for index, name in enumerate(("height_m", "hip_position_rad", "knee_position_rad")):
-        assert poses[:, index] == pytest.approx(trace.column(name)[ticks])
+        assert poses[:, index] == pytest.approx(fixed.column(name)[ticks])
     assert set(poses[:, 3]) == {0.35}
 
 
-def test_without_opengl_there_is_a_reason_instead(robot, traces, monkeypatch):
+def test_without_opengl_there_is_a_reason_instead(robot, judged, monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "nonsense")
-    video = render_hops(robot, "spring", COLOURS[0], traces)
+    (video,) = render_videos(robot, judged.runs).values()
     assert video.content is None
     assert "libegl1" in video.reason
 
 
 @pytest.mark.slow
-def test_a_video_moves_or_says_why_there_is_none(robot, traces):
-    video = render_hops(robot, "spring", COLOURS[0], traces)
+def test_a_video_moves_or_says_why_there_is_none(robot, judged):
+    (video,) = render_videos(robot, judged.runs).values()
     if video.content is None:
         assert video.reason
         return

@@ -122,10 +122,11 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     if args.traces:
         trials.save_traces(judged.runs, args.traces)
     if args.report:
-        from hopping_leg.evaluate.report import render_videos, write_report
+        from hopping_leg.evaluate.report import write_report
+        from hopping_leg.evaluate.video import render_videos
 
         with terminal.said_if_slow("Writing the report."):
-            videos = render_videos(judged, setup.robot) if args.video else None
+            videos = render_videos(setup.robot, judged.runs) if args.video else None
             io.write_atomically(args.report, write_report(judged, videos))
     options.say_written(args.json, args.report, args.traces)
 

@@ -1,8 +1,6 @@
 """The report: figures of an evaluation, and one HTML page that holds all and needs nothing."""
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from statistics import median_high
 from typing import Any
@@ -12,10 +10,9 @@ from matplotlib.figure import Figure
 from hopping_leg.evaluate import figures, runner, tables
 from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.evaluate.trials import KINDS, Run
-from hopping_leg.evaluate.video import Video, fixed_traces, render_hops
+from hopping_leg.evaluate.video import Video
 from hopping_leg.figures import controller_colours
 from hopping_leg.html_page import data_uri, page_template, svg_uri
-from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import Trace
 
 
@@ -135,18 +132,6 @@ def write_report(judged: runner.EvaluationRun, videos: Mapping[str, Video] | Non
         conditions=flat_conditions({**evaluation.conditions, **evaluation.versions}),
     )
     return page.encode()
-
-
-def render_videos(judged: runner.EvaluationRun, robot: Robot) -> dict[str, Video]:
-    """Render one video per controller that ran fixed trials."""
-    colours = controller_colours(judged.evaluation.controllers)
-    hopped = {name: traces for name in colours if (traces := fixed_traces(judged.runs, name))}
-
-    def render(name: str) -> Video:
-        return render_hops(robot, name, colours[name], hopped[name])
-
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return dict(zip(hopped, pool.map(render, hopped), strict=True))
 
 
 def _subtitle(c: dict[str, Any]) -> str:

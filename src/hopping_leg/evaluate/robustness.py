@@ -56,19 +56,6 @@ class Suite:
     seconds: float
     """Duration of each trial, s."""
 
-    @property
-    def conditions(self) -> dict[str, Any]:
-        """What all results depend on, as JSON values."""
-        return {
-            **runner.setup_conditions(self.setup),
-            "commands_m": self.commands,
-            "seeds": self.repeats,
-            "seed": self.seed,
-            "seconds": self.seconds,
-            "joint_points": JOINT_POINTS,
-            "tolerance_m": TOLERANCE,
-        }
-
 
 def make_suite(
     setup: RolloutConfig,
@@ -130,7 +117,15 @@ def run_suite(
         "scores": scores,
         "levels": levels,
         "axes": [{k: v for k, v in vars(axis).items() if k != "alter"} for axis in suite.axes],
-        "conditions": suite.conditions,
+        "conditions": {
+            **runner.setup_conditions(suite.setup),
+            "commands_m": suite.commands,
+            "seeds": suite.repeats,
+            "seed": suite.seed,
+            "seconds": suite.seconds,
+            "joint_points": JOINT_POINTS,
+            "tolerance_m": TOLERANCE,
+        },
         "versions": runner.software_versions(),
         "notes": [note for entry in entries for note in entry.notes],
     }

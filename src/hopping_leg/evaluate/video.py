@@ -9,7 +9,8 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 
 import mujoco
@@ -17,7 +18,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from hopping_leg.evaluate import metrics, trials
-from hopping_leg.figures import COMMAND, rgb
+from hopping_leg.figures import COMMAND, controller_colours, rgb
 from hopping_leg.hop_detection import trace_hops
 from hopping_leg.robot import Robot, get_spec
 from hopping_leg.trace import Trace
@@ -49,25 +50,28 @@ class Video:
     reason: str = ""
 
 
-def fixed_traces(runs: Sequence[trials.Run], controller: str) -> dict[float, Trace]:
-    """Return a controller's first run at each command, m."""
-    return {
-        run.trial.steps[0][0]: run.trace
-        for run in runs
-        if run.controller == controller and run.trial.kind == "fixed" and run.repeat == 0
-    }
+def render_videos(robot: Robot, runs: Sequence[trials.Run]) -> dict[str, Video]:
+    """Render a video per controller: a hop of its first fixed trial at each command, half speed."""
+    colours = controller_colours(run.controller for run in runs)
+    clips: dict[str, list[Clip]] = {}
+    for run in runs:
+        if run.trial.kind == "fixed" and run.repeat == 0:
+            poses = sample(run.trace, _first_apex(run.trace), CLIP_SECONDS)
+            own = clips.setdefault(run.controller, [])
+            own.append(Clip(run.controller, colours[run.controller], poses))
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        videos = pool.map(
+            lambda own: render_clips(robot, own, 1000 * SLOWDOWN / FRAME_RATE), clips.values()
+        )
+        return dict(zip(clips, videos, strict=True))
 
 
-def render_hops(robot: Robot, who: str, colour: str, traces: Mapping[float, Trace]) -> Video:
-    """Render the first hop that counts of a controller's runs side by side, at half speed."""
-    clips = []
-    for trace in traces.values():
-        time = trace.column("time_s")
-        apexes = time[trace_hops(trace).tick]
-        settled = apexes[apexes >= metrics.START_SECONDS]
-        start = float(settled[0] if len(settled) else min(metrics.START_SECONDS, time[-1]))
-        clips.append(Clip(who, colour, sample(trace, start, CLIP_SECONDS)))
-    return render_clips(robot, clips, 1000 * SLOWDOWN / FRAME_RATE)
+def _first_apex(trace: Trace) -> float:
+    """Return when the first apex after the start is, s."""
+    time = trace.column("time_s")
+    apexes = time[trace_hops(trace).tick]
+    settled = apexes[apexes >= metrics.START_SECONDS]
+    return float(settled[0] if len(settled) else min(metrics.START_SECONDS, time[-1]))
 
 
 def sample(
