@@ -11,7 +11,7 @@ CEILINGS = {
     "src/hopping_leg/cli/**/*.py": (16, 2210),
     "src/hopping_leg/controllers/**/*.py": (20, 2880),
     "src/hopping_leg/deploy/**/*.py": (20, 3300),
-    "src/hopping_leg/emulator/**/*.py": (15, 2300),
+    "src/hopping_leg/emulator/**/*.py": (15, 2250),
     "src/hopping_leg/envs/**/*.py": (10, 1570),
     "src/hopping_leg/evaluate/**/*.py": (14, 2530),
     "src/hopping_leg/formats/**/*.py": (1, 240),
@@ -20,10 +20,10 @@ CEILINGS = {
     "src/hopping_leg/robot/**/*.py": (14, 2360),
     "src/hopping_leg/sim/**/*.py": (12, 2430),
     "src/hopping_leg/viewer/**/*.py": (6, 1220),
-    "src/**/*.py": (186, 29860),
+    "src/**/*.py": (186, 29810),
     "tests/**/*.py": (142, 16220),
     "studies/**/*.py": (79, 8190),
-    "docs/**/*.md": (22, 2510),
+    "docs/**/*.md": (22, 2500),
     "docs/live/*.js": (13, 1490),
 }
 """Files and lines at most. Who raises one says what users gain by it."""

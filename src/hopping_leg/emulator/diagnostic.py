@@ -55,35 +55,17 @@ class Diagnostic:
             case ["tel", "stop"]:
                 return _OK
             case ["conf", "get", name]:
-                if name not in settings.names():
-                    raise UsageError("error reading")
                 return f"{settings.text(name)}\r\n".encode()
             case ["conf", "set", name, value]:
                 settings.set(name, value)
-            case ["conf", "enumerate", *group]:
-                names = settings.names(*group[:1])
-                return b"".join(f"{n} {settings.text(n)}\r\n".encode() for n in names) + _OK
             case ["conf", "write"]:
                 settings.save()
-            case ["conf", "load"]:
-                settings.load()
-            case ["conf", "default"]:
-                settings.reset()
             case ["d", "stop"]:
                 self._stop(time)
             case ["d", "nearest" | "rezero", *where]:
                 self._encoder.set_nearest(float(where[0]) if where else 0.0)
             case ["d", "exact", where]:
                 self._encoder.set_exact(float(where))
-            case ["d", "cfg-set-output", where]:
-                self._set_offset(float(where))
             case _:
                 raise UsageError("unknown command")
         return _OK
-
-    def _set_offset(self, where: float) -> None:
-        """Change the configured offset so that the output is at a position, revolutions."""
-        settings, position = self._settings, self._encoder.position
-        change = (where - position) * settings["motor_position.output.sign"]
-        offset = settings["motor_position.output.offset"] + change
-        settings.set("motor_position.output.offset", repr(offset))

@@ -1,7 +1,7 @@
 """What a drive can be configured to: the values of its ``conf`` tree, in RAM and in flash.
 
 Defaults are those of firmware for the controller board r4 with what the qdd100 is delivered with;
-only values that the emulator obeys or a host may want to check are here.
+only values that the emulator obeys are here.
 """
 
 from __future__ import annotations
@@ -10,54 +10,28 @@ from collections.abc import Callable
 
 from hopping_leg.errors import UsageError, unknown_name
 
-_NAN = float("nan")
-
 DEFAULTS: dict[str, int | float] = {
     "id.id": 1,
-    "can.prefix": 0,
-    "motor.poles": 42,
-    "motor.phase_invert": 0,
-    "motor.resistance_ohm": 0.047,
-    "motor.Kv": 304.0,
-    "motor_position.commutation_source": 0,
-    "motor_position.output.source": 0,
     "motor_position.output.offset": 0.0,
     "motor_position.output.sign": 1,
-    "motor_position.output.reference_source": -1,
     "motor_position.rotor_to_output_ratio": 1 / 6,
-    "motor_position.rotor_to_output_override": 0,
-    "servo.pwm_rate_hz": 30000,
     "servo.max_voltage": 46.0,
-    "servo.max_power_W": _NAN,
     "servo.temperature_margin": 25.0,
     "servo.fault_temperature": 75.0,
-    "servo.enable_motor_temperature": 0,
-    "servo.motor_temperature_margin": 20.0,
-    "servo.motor_fault_temperature": _NAN,
-    "servo.fault_position_error": _NAN,
-    "servo.fault_velocity_error": _NAN,
-    "servo.velocity_threshold": 0.0,
     "servo.position_derate": 0.02,
     "servo.pid_position.kp": 50.0,
-    "servo.pid_position.ki": 0.0,
     "servo.pid_position.kd": 1.0,
-    "servo.pid_position.ilimit": 0.0,
-    "servo.default_velocity_limit": _NAN,
-    "servo.default_accel_limit": _NAN,
     "servo.default_timeout_s": 0.1,
     "servo.timeout_max_torque_Nm": 5.0,
     "servo.timeout_mode": 12,
-    "servo.flux_brake_margin_voltage": 3.0,
-    "servo.flux_brake_resistance_ohm": 0.025,
     "servo.max_current_A": 100.0,
     "servo.derate_current_A": -20.0,
     "servo.max_velocity": 500.0,
     "servo.max_velocity_derate": 2.0,
-    "servo.cooldown_cycles": 256,
     "servopos.position_min": -0.01,
     "servopos.position_max": 0.01,
 }
-"""Names as in ``conf enumerate``."""
+"""Names as in ``conf get``."""
 
 
 class Settings:
@@ -101,12 +75,10 @@ class Settings:
 
     def text(self, name: str) -> str:
         """Return a value as the firmware prints it."""
+        if name not in self._values:
+            raise UsageError("error reading")
         value = self._values[name]
         return str(value) if isinstance(value, int) else f"{value:.6f}"
-
-    def names(self, group: str = "") -> list[str]:
-        """Return all names in a group, all if empty."""
-        return [n for n in self._values if not group or n == group or n.startswith(group + ".")]
 
     def save(self) -> None:
         """Write RAM to flash."""
@@ -115,9 +87,4 @@ class Settings:
     def load(self) -> None:
         """Read flash to RAM, as after power was lost."""
         self._values = dict(self._saved)
-        self._changed()
-
-    def reset(self) -> None:
-        """Set RAM to the firmware's defaults."""
-        self._values = dict(DEFAULTS)
         self._changed()
