@@ -278,19 +278,12 @@ def _boxes(form):
     return Kind(files, "run.blackbox", recover, content=framed, seal=seal)
 
 
-def _checkpoints(form):
-    from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
+def _checkpoints():
+    from hopping_leg.rl.checkpoint import read_checkpoint, write_checkpoint
 
     tree = {"weights": np.arange(60.0).reshape(3, 20), "steps": 7, "names": ["a", {"b": np.eye(2)}]}
     files = _written(lambda folder: write_checkpoint(folder, 7, tree))
-    state, arrays = sorted(files, reverse=True)
-    read = lambda path: read_checkpoint(list_checkpoints(path.parent.parent)[0])  # noqa: E731
-    if form == "old":  # of a version without checksums
-        stored = json.loads(files[state])
-        del stored["sha256"]
-        files[state] = json.dumps(stored).encode()
-    name = state if form == "state" else arrays
-    return Kind(files, name, read, text=form == "state")
+    return Kind(files, *files, read_checkpoint, text=False)
 
 
 TRAINING = {
@@ -350,7 +343,7 @@ KINDS = {
     **{f"bag-{form}": functools.partial(_bags, form) for form in ("mcap", "sqlite")},
     **{f"trace-{f}": functools.partial(_traces, f) for f in ("header", "excitation")},
     **{f"flight-recorder-{f}": functools.partial(_boxes, f) for f in ("raw", "framed")},
-    **{f"checkpoint-{f}": functools.partial(_checkpoints, f) for f in ("state", "arrays", "old")},
+    "checkpoint": _checkpoints,
     **{f"run-{f}": functools.partial(_runs, f) for f in ("config", "result")},
     **{f"policy-{f}": functools.partial(_policies, f) for f in ("raw", "card")},
 }

@@ -1,5 +1,6 @@
 import errno
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -76,7 +77,7 @@ def test_a_full_disk_leaves_no_half_checkpoint_and_names_the_next_command(
     def full(_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(checkpoint.os, "fsync", full)
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(TraceError, match="No space left on device; nothing was changed"):
         checkpoint.write_checkpoint(tmp_path / "checkpoints", 7, {"steps": 7})
     assert not list((tmp_path / "checkpoints").iterdir())

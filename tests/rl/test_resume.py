@@ -1,6 +1,7 @@
 """What was stopped goes on as if nothing had happened, and nothing else is taken for it."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -41,18 +42,22 @@ def test_a_killed_training_ends_with_the_same_policy(name, tmp_path, monkeypatch
     assert len(one) == {"sac": 0, "universal": 3}.get(name, 4)
 
 
-def test_only_whole_checkpoints_count_two_are_kept_and_none_holds_a_pickle(tmp_path):
+def test_only_whole_checkpoints_count_two_are_kept_and_no_code_in_them_runs(tmp_path):
     for steps in (1, 2, 3):
         write_checkpoint(tmp_path, steps, {"a": np.arange(steps), "b": [steps, None, 2**100]})
-    (tmp_path / "checkpoint-000000000009.tmp").mkdir()
-    for what in (object(), np.array([object()])):
-        with pytest.raises(TypeError):
-            write_checkpoint(tmp_path, 4, {"a": what})
+    (tmp_path / "checkpoint-000000000009.pt.part").touch()
     found = list_checkpoints(tmp_path)
-    assert [p.name[-1] for p in found] == ["2", "3"]
+    assert [p.stem[-1] for p in found] == ["2", "3"]
     tree = read_checkpoint(found[-1])
     assert tree["a"].tolist() == [0, 1, 2]
     assert tree["b"] == [3, None, 2**100]
+    content = bytearray(found[-1].read_bytes())
+    content[content.index(np.arange(3).tobytes())] += 1
+    found[-1].write_bytes(content)
+    torch.save({"a": Path("code")}, found[0])
+    for path in found:
+        with pytest.raises(UsageError, match="is damaged"):
+            read_checkpoint(path)
 
 
 def test_a_run_is_never_overwritten_or_mixed(tmp_path, monkeypatch):

@@ -9,7 +9,6 @@ Examples:
   hop train --recipe precise --robot legv2
   hop train --recipe paper --seed 1 --out runs/mine
   hop train --recipe paper --seed 1 --out runs/mine --resume
-  hop train --recipe fast --out runs/shared --log wandb
   hop evaluate runs/mine/policy.onnx
 """
 
@@ -61,8 +60,6 @@ class Options:
     ray: str | None = None
     """Address of a Ray cluster that finds out what the teacher reaches on legs of any size, for
     `universal`; `local` starts one here. Default: processes of this machine."""
-    log: Literal["tensorboard", "wandb", "trackio"] = "tensorboard"
-    """Logger besides TensorBoard; wandb and trackio have to be installed."""
     json: JsonFile = None
 
 
@@ -95,7 +92,6 @@ def run(args: Options) -> None:
             source=args.source,
             minutes=args.minutes,
             threads=args.threads,
-            log=args.log,
             ray=args.ray,
         )
     print(trained.policy.with_name("model_card.md").read_text(encoding="utf-8"))

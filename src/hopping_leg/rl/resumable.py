@@ -4,6 +4,7 @@ The state is taken at the entry of ``collect_rollouts``: after the gradient step
 exploration noise is drawn. Continuing from there is the same as never having stopped, bit by bit.
 """
 
+import copy
 import random
 import time
 from collections import deque
@@ -15,7 +16,7 @@ import torch
 from stable_baselines3 import SAC
 
 from hopping_leg.envs.observation import Observation
-from hopping_leg.rl.checkpoint import Tree
+from hopping_leg.rl.checkpoint import Tree, to_numpy, to_torch
 from hopping_leg.rl.learner import RecentHops
 from hopping_leg.rl.onnx_export import Actor, DenseActor
 from hopping_leg.rl.sb3_env import TaskVecEnv
@@ -93,13 +94,13 @@ class ResumableSAC(SAC):  # type: ignore[misc]
     def state(self) -> Tree:
         """Return everything needed to continue exactly, its environment included."""
         tree = {
-            "policy": to_numpy(self.policy.state_dict()),
-            "optimizers": [to_numpy(o.state_dict()) for o in _optimizers(self)],
+            "policy": to_numpy(copy.deepcopy(self.policy.state_dict())),
+            "optimizers": [to_numpy(copy.deepcopy(o.state_dict())) for o in _optimizers(self)],
             "counters": {name: getattr(self, name) for name in _COUNTERS},
             "env": self.env.state(),
             "last_observation": self._last_obs,
             "last_episode_starts": self._last_episode_starts,
-            "episodes": [{"r": e["r"], "l": e["l"], "t": e["t"]} for e in self.ep_info_buffer],
+            "episodes": list(self.ep_info_buffer),
             "random": _random_state(self),
             "replay": _replay_state(self.replay_buffer),
         }
@@ -114,7 +115,7 @@ class ResumableSAC(SAC):  # type: ignore[misc]
         if "log_ent_coef" in state:
             self.log_ent_coef.data.copy_(torch.from_numpy(state["log_ent_coef"]))
         for optimizer, tree in zip(_optimizers(self), state["optimizers"], strict=True):
-            load_optimizer(optimizer, tree)
+            optimizer.load_state_dict(copy.deepcopy(to_torch(tree)))
         for name, value in state["counters"].items():
             setattr(self, name, value)
         self._last_obs = state["last_observation"]
@@ -131,28 +132,6 @@ class ResumableSAC(SAC):  # type: ignore[misc]
 def _optimizers(model: SAC) -> list[torch.optim.Optimizer]:
     own = [model.actor.optimizer, model.critic.optimizer]
     return own + ([model.ent_coef_optimizer] if model.ent_coef_optimizer is not None else [])
-
-
-def load_optimizer(optimizer: torch.optim.Optimizer, state: Tree) -> None:
-    """Bring an optimizer to a ``to_numpy`` of its state."""
-    slots = {int(key): to_torch(value) for key, value in state["state"].items()}
-    optimizer.load_state_dict({**state, "state": slots})
-
-
-def to_numpy(node: Any) -> Any:  # noqa: ANN401
-    """Return nested containers with arrays in the place of tensors."""
-    if isinstance(node, dict):
-        return {key: to_numpy(value) for key, value in node.items()}
-    if isinstance(node, list | tuple):
-        return [to_numpy(value) for value in node]
-    return node.detach().cpu().numpy().copy() if isinstance(node, torch.Tensor) else node
-
-
-def to_torch(node: Any) -> Any:  # noqa: ANN401
-    """Return a nested dictionary with tensors in the place of arrays."""
-    if isinstance(node, dict):
-        return {key: to_torch(value) for key, value in node.items()}
-    return torch.from_numpy(node.copy()) if isinstance(node, np.ndarray) else node
 
 
 def _replay_state(buffer: Any) -> Tree:  # noqa: ANN401

@@ -16,7 +16,7 @@ from hopping_leg.robot import Robot, load_robot, robot_text, robot_tree, shipped
 
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "onnxruntime", "stable-baselines3", "torch")
 
-_ASKED = ["recipe", "robot_digest", "seed", "minutes_budget", "source", "options"]
+_ASKED = ("recipe", "robot_digest", "seed", "minutes_budget", "source", "options")
 """What a run must have been asked for alike to go on."""
 
 
@@ -32,47 +32,36 @@ class RunFolder:
         minutes: float | None,
         source: Path | None = None,
     ) -> None:
-        self.path, self._source, self._robot = path, source, robot
-        self._defaults = as_stored(asdict(recipes.RECIPES.get(recipe.name, recipe)))
-        self.config = as_stored(
-            {
-                "recipe": recipe.name,
-                "options": asdict(recipe),
-                "robot": robot.name,
-                "robot_digest": robot.digest,
-                "seed": seed,
-                "minutes_budget": minutes,
-                "source": str(source) if source else None,
-                "versions": library_versions(),
-            }
-        )
-        """What the run was asked for, as JSON values."""
-
-    @property
-    def checkpoints(self) -> Path:
-        """Folder of the checkpoints."""
-        return self.path / "checkpoints"
-
-    @property
-    def policy(self) -> Path:
+        self.path, self.checkpoints = path, path / "checkpoints"
+        self.policy = path / "policy.onnx"
         """The selected policy, once the training is over."""
-        return self.path / "policy.onnx"
+        self._recipe, self._robot, self._source = recipe, robot, source
+        config = {
+            "recipe": recipe.name,
+            "options": asdict(recipe),
+            "robot": robot.name,
+            "robot_digest": robot.digest,
+            "seed": seed,
+            "minutes_budget": minutes,
+            "source": str(source) if source else None,
+            "versions": {k: v for k, v in versions(*_LIBRARIES).items() if k != "python"},
+        }
+        self.config: dict[str, Any] = json.loads(json.dumps(config, default=_name))
+        """What the run was asked for, as JSON values."""
 
     @property
     def command(self) -> str:
         """The command that makes such a run."""
-        config = self.config
-        recipe = config["options"]["source"] or config["recipe"]
-        robot = config["robot"]
+        robot = self._robot.name
         if robot not in shipped_robots() or load_robot(robot) != self._robot:
             robot = str(self.path / ROBOT_FILE)
-        words = ["hop", "train", "--recipe", recipe, "--robot", robot]
-        words += ["--seed", str(config["seed"])]
-        if config["source"] is not None:
-            words += ["--source", config["source"]]
-        if config["minutes_budget"] is not None:
-            words += ["--minutes", f"{config['minutes_budget']:g}"]
-        return shlex.join([*words, *recipes.words_of(config["recipe"], config["options"])])
+        words = ["hop", "train", "--recipe", self._recipe.source or self._recipe.name]
+        words += ["--robot", robot, "--seed", str(self.config["seed"])]
+        if self._source is not None:
+            words += ["--source", str(self._source)]
+        if self.config["minutes_budget"] is not None:
+            words += ["--minutes", f"{self.config['minutes_budget']:g}"]
+        return shlex.join([*words, *recipes.words_of(self._recipe)])
 
     def snapshot(self, steps: int) -> Path:
         """Return the file of the policy as it was after so many steps."""
@@ -88,7 +77,10 @@ class RunFolder:
         found = [] if new else checkpoint.list_checkpoints(self.checkpoints)
         if not new:
             self.check_same()
-            refuse_finished(self.policy)
+            if self.policy.exists():
+                raise UsageError(
+                    f"The run in {self.path} is finished; its policy is {self.policy}."
+                )
         tree = checkpoint.read_checkpoint(found[-1]) if found else self._from_source()
         if new:
             self.write("config.json", self.config)
@@ -108,18 +100,18 @@ class RunFolder:
         write_json(self.path / name, content)
 
     def check_same(self) -> None:
-        """Raise ``UsageError`` where the run in the folder was asked for something else."""
-        stored = read_json(self.path / "config.json")
-        # A run from before an option existed was asked for what is its default.
-        options = stored.get("options")
-        if not isinstance(options, dict):
-            raise UsageError(f"{self.path / 'config.json'} is damaged; give another --out.")
-        _complete(options, self._defaults)
-        asked = {key: self.config[key] for key in _ASKED}
-        for config in (stored, asked):
-            if isinstance(config.get("source"), str):
-                config["source"] = str(Path(config["source"]).resolve())
-        check_same(self.path, stored, asked)
+        """Raise ``UsageError`` that names what else the run in the folder was asked for."""
+        stored = _read_json(self.path / "config.json")
+        for key in _ASKED:
+            there, asked = stored.get(key), self.config[key]
+            if key == "source" and there and asked:
+                there, asked = (str(Path(str(source)).resolve()) for source in (there, asked))
+            if there != asked:
+                raise UsageError(
+                    f"The run in {self.path} has another {key.replace('_', ' ')}"
+                    f" ({_short(there)} instead of {_short(asked)});"
+                    " resume it with the options that it began with."
+                )
 
 
 def write_robot(folder: Path, robot: Robot) -> None:
@@ -141,41 +133,6 @@ def is_new(folder: Path, *, resume: bool) -> bool:
     return False
 
 
-def check_same(folder: Path, stored: dict[str, Any], asked: dict[str, Any]) -> None:
-    """Raise ``UsageError`` that names the first difference where a run was asked for another."""
-    for key, value in asked.items():
-        if stored.get(key) != value:
-            raise UsageError(
-                f"The run in {folder} has another {key.replace('_', ' ')}"
-                f" ({_short(stored.get(key))} instead of {_short(value)});"
-                " resume it with the options that it began with."
-            )
-
-
-def refuse_finished(policy: Path) -> None:
-    """Raise ``UsageError`` where a run has left its policy."""
-    if policy.exists():
-        raise UsageError(f"The run in {policy.parent} is finished; its policy is {policy}.")
-
-
-def _complete(options: dict[str, Any], defaults: dict[str, Any]) -> None:
-    """Add what is missing, in the parts of the options, too."""
-    for name, value in defaults.items():
-        if isinstance(options.setdefault(name, value), dict) and isinstance(value, dict):
-            _complete(options[name], value)
-
-
-def as_stored(values: dict[str, Any]) -> dict[str, Any]:
-    """Return values as JSON gives them back."""
-    stored: dict[str, Any] = json.loads(json.dumps(values, default=_name))
-    return stored
-
-
-def read_json(file: Path) -> dict[str, Any]:
-    """Return the object in a JSON file."""
-    return parse_json(file.read_bytes(), str(file))
-
-
 def read_result(path: Path) -> dict[str, Any]:
     """Return a finished run's ``result.json``; ``UsageError`` where there is none."""
     file = path / "result.json"
@@ -183,12 +140,11 @@ def read_result(path: Path) -> dict[str, Any]:
         raise UsageError(
             f"{path} holds no finished run; repeat the command that began it, with --resume."
         )
-    return read_json(file)
+    return _read_json(file)
 
 
-def library_versions() -> dict[str, str]:
-    """Return the versions of the libraries that decide about a training's result."""
-    return {k: v for k, v in versions(*_LIBRARIES).items() if k != "python"}
+def _read_json(file: Path) -> dict[str, Any]:
+    return parse_json(file.read_bytes(), str(file))
 
 
 def _name(function: object) -> str:

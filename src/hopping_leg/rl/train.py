@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from stable_baselines3.common.logger import configure
 
 from hopping_leg import errors, io, locks
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.envs import TaskLeg
 from hopping_leg.rl import (
-    loggers,
     onnx_export,
     policy_evaluation,
     run_folder,
@@ -91,7 +91,6 @@ def train(
     minutes: float | None = None,
     threads: int = 1,
     quiet: bool = False,
-    log: loggers.Log = "tensorboard",
     ray: str | None = None,
     on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None,
 ) -> Trained:
@@ -111,16 +110,14 @@ def train(
         minutes: Stop after so much wall-clock time, pauses excluded, or at the recipe's steps.
         threads: Threads of torch and physics; torch's is set for the whole process.
         quiet: Show no progress.
-        log: Who gets the curves besides TensorBoard.
         ray: Address of a Ray cluster that finds out what the teacher reaches on legs of any size;
             without one, processes of this machine do, as many as ``threads``, at least two.
         on_snapshot: Called with steps and score, m, of every snapshot; may raise to end it.
 
     Raises:
-        UsageError: ``out`` holds a run that cannot be continued so, or ``log`` lacks a package.
+        UsageError: ``out`` holds a run that cannot be continued so.
         RobotError: The robot has effects that training does not simulate.
     """
-    loggers.check_log(log)
     if minutes is not None and not 0 < minutes < float("inf"):
         raise errors.UsageError(f"--minutes is {minutes:g} but must be positive.")
     if not robot.reality.only_delays:
@@ -143,7 +140,7 @@ def train(
             )
             trainer = Trainer(recipe, robot, seed, folder, minutes, threads, began, legs)
             trainer.end_stage(worst_score)
-            trainer.learner.set_logger(loggers.make_logger(folder.path, log, folder.config))
+            trainer.learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
             trainer.on_snapshot = on_snapshot
             if tree is not None:
                 trainer.restore(tree)

@@ -24,11 +24,10 @@ from hopping_leg.controllers import robot_numbers
 from hopping_leg.controllers.mpc import HopShape, Planning, TrueStateMpc
 from hopping_leg.envs.hidden_state import HiddenState
 from hopping_leg.envs.task import HoppingTask, Step
-from hopping_leg.rl.checkpoint import Tree
+from hopping_leg.rl.checkpoint import Tree, to_numpy, to_torch
 from hopping_leg.rl.distillation.buffer import LabelledRollout, RolloutBuffer
 from hopping_leg.rl.distillation.students import Student, StudentConfig
 from hopping_leg.rl.learner import RecentHops
-from hopping_leg.rl.resumable import load_optimizer, to_numpy, to_torch
 from hopping_leg.robot import GRAVITY
 from hopping_leg.sim import LegSimulator
 
@@ -313,8 +312,8 @@ class Dagger:
     def state(self) -> Tree:
         """Return everything needed to continue exactly, environments included."""
         return {
-            "student": to_numpy(self.student.state_dict()),
-            "optimizer": to_numpy(self.optimizer.state_dict()),
+            "student": to_numpy(copy.deepcopy(self.student.state_dict())),
+            "optimizer": to_numpy(copy.deepcopy(self.optimizer.state_dict())),
             "buffer": self._buffer.state(),
             "task": self.task.state(),
             "teacher": self.teacher.state(),
@@ -333,7 +332,7 @@ class Dagger:
     def restore(self, state: Tree) -> None:
         """Go on from a ``state``."""
         self.student.load_state_dict(to_torch(state["student"]))
-        load_optimizer(self.optimizer, state["optimizer"])
+        self.optimizer.load_state_dict(copy.deepcopy(to_torch(state["optimizer"])))
         self._buffer.restore(state["buffer"])
         self._seen = self.task.restore(state["task"])
         self.teacher.restore(state["teacher"])

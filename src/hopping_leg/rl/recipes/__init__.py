@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Any, Literal, get_args, get_type_hints
 
 from hopping_leg.controllers.user_controllers import load_user_object
@@ -92,45 +91,28 @@ def settings_of(recipe: Recipe) -> dict[str, int | float | str]:
     }
 
 
-def changes_of(usual: Recipe, options: dict[str, Any]) -> list[str]:
-    """Return ``name=value`` of the options of a ``config.json`` that differ from a recipe's."""
-    paths = dict(usual.paths())
-    stored = {name: _at(options, paths[name], v) for name, v in settings_of(usual).items()}
-    return [f"{name}={v}" for name, v in stored.items() if v != usual.value(name)]
-
-
-def words_of(name: str, options: dict[str, Any]) -> list[str]:
+def words_of(recipe: Recipe) -> list[str]:
     """Return the words of ``hop train`` beside ``--recipe`` that make a recipe.
 
-    A recipe that is neither shipped nor a file's has none. The options are as in ``config.json``.
+    A recipe that is neither shipped nor a file's has none.
     """
-    given = options.get("source") or name
-    if name not in RECIPES and given == name:
+    if recipe.source is None and recipe.name not in RECIPES:
         return []
-    usual, words = get_recipe(given), list[str]()
-    ranges, seen = _ranges_of(options["task"]["randomised"]), options["task"]["observation"]
-    if ranges not in (None, _ranges_of([asdict(r) for r in usual.task.randomised])):
-        words += ["--randomise", ranges]
-    if seen != usual.task.observation:
-        words += ["--observation", seen]
-    if options.get("heights"):
-        words += ["--heights", *map(str, options["heights"])]
-    changes = changes_of(usual, options)
+    usual, words = get_recipe(recipe.source or recipe.name), list[str]()
+    drawn = recipe.task.randomised
+    if drawn != usual.task.randomised:  # ranges of one's own have no word
+        words += [w for name, r in _RANGES.items() if r == drawn for w in ("--randomise", name)]
+    if recipe.task.observation != usual.task.observation:
+        words += ["--observation", recipe.task.observation]
+    if recipe.heights:
+        words += ["--heights", *map(str, recipe.heights)]
+    changes = changes_of(usual, recipe)
     return [*words, "--set", *changes] if changes else words
 
 
-def _ranges_of(stored: list[Any]) -> Randomise | None:
-    """Return from which ranges the legs of a run drew their numbers, None if from a user's own."""
-    drawn = [[s["path"], s["low"], s["high"]] for s in stored]
-    for name, ranges in _RANGES.items():
-        if drawn == [[s.path, s.low, s.high] for s in ranges]:
-            return name
-    return None
-
-
-def _at(options: dict[str, Any], path: str, default: Any) -> Any:  # noqa: ANN401
-    for name in path.split("."):
-        if not isinstance(options, dict) or name not in options:
-            return default
-        options = options[name]
-    return options
+def changes_of(usual: Recipe, recipe: Recipe) -> list[str]:
+    """Return ``name=value`` of the options that ``--set`` has to change to make a recipe."""
+    numbers = settings_of(usual)
+    return [
+        f"{name}={recipe.value(name)}" for name in numbers if recipe.value(name) != numbers[name]
+    ]
