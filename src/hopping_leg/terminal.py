@@ -82,7 +82,7 @@ class Progress(contextlib.AbstractContextManager["Progress"]):
         if share < task.completed:
             self._bar.reset(self._task)
         self._bar.update(self._task, description=label, completed=share, total=1.0, note=note)
-        left = "" if task.time_remaining is None else f"{self._left.render(task)} left"
+        left = f"{self._left.render(task)} left" if task.time_remaining else ""
         done = f"{label} {100 * share:.0f} %".strip()
         self.text = " · ".join(filter(None, (done, note, left)))
 

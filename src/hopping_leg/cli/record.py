@@ -18,13 +18,13 @@ Examples:
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import tyro
 
 from hopping_leg.cli import motors, options
-from hopping_leg.cli.options import JsonFile, RobotFile, save_json, say, say_next, show_table
+from hopping_leg.cli.options import RobotFile, say, say_next, show_table
 from hopping_leg.controllers import command_schedule, joint_pd
 from hopping_leg.deploy import hardware_trials, keyboard, safety_limits, stop_reasons
 from hopping_leg.deploy.motion_sequence import MotionSequence, Poses, SequenceTiming, hopping_poses
@@ -52,7 +52,6 @@ class Common:
     robot: RobotFile = "legv2"
     out: Path = Path("excitation.parquet")
     """Parquet file to write."""
-    json: JsonFile = None
     rate: float = RATE
     """Targets per second, Hz."""
     track_velocity: bool = False
@@ -137,60 +136,42 @@ def run(
 
 
 def _write(args: MovingBase | MultisineCommand) -> None:
-    """Write an excitation."""
-    robot = load_robot(args.robot)
-    limits = HardwareRange(args.hip_range, args.knee_range)
+    """Write an excitation, show what it asks of the leg."""
+    robot, limits = load_robot(args.robot), HardwareRange(args.hip_range, args.knee_range)
+    template: Template
+    if isinstance(args, MultisineCommand):
+        template = args.signal
+    else:
+        make = paper.moving_base
+        if isinstance(args, FixedBase):
+            make = partial(paper.fixed_base, swings=args.swings)
+        template = make(
+            args.amplitudes,
+            args.periods,
+            duration=args.duration,
+            margin=args.margin,
+            bend=args.bend,
+        )
+        if args.adapt:
+            template = paper.adapt(template, robot, rate=args.rate, limits=limits)
     excitation = make_excitation(
-        _template(args, robot, limits),
-        robot,
-        rate=args.rate,
-        limits=limits,
-        track_velocity=args.track_velocity,
+        template, robot, rate=args.rate, limits=limits, track_velocity=args.track_velocity
     )
     excitation.save(args.out)
-    facts = _facts(excitation, robot)
+    asked = demand(robot, excitation.rig, excitation.position, excitation.rate)
+    largest = {
+        "lowest, rad": asked.position.min(axis=0),
+        "highest, rad": asked.position.max(axis=0),
+        "speed, rad/s": np.abs(asked.velocity).max(axis=0),
+        "torque, N m": np.abs(asked.torque).max(axis=0),
+    }
     show_table(
         ("", "hip", "knee"),
-        [(name, *(f"{x:.3g}" for x in pair)) for name, pair in facts["largest"].items()],
+        [(name, *(f"{x:.3g}" for x in pair)) for name, pair in largest.items()],
         f"{args.out}: {len(excitation)} targets for {robot.name}",
     )
     say(*excitation.description.split("; "))
-    save_json(args.json, facts)
     say_next(["hop", "record", "play", args.out, "--robot", args.robot])
-
-
-def _template(args: MovingBase | MultisineCommand, robot: Robot, limits: HardwareRange) -> Template:
-    if isinstance(args, MultisineCommand):
-        return args.signal
-    make = paper.moving_base
-    if isinstance(args, FixedBase):
-        make = partial(paper.fixed_base, swings=args.swings)
-    strokes = make(
-        args.amplitudes,
-        args.periods,
-        duration=args.duration,
-        margin=args.margin,
-        bend=args.bend,
-    )
-    return paper.adapt(strokes, robot, rate=args.rate, limits=limits) if args.adapt else strokes
-
-
-def _facts(excitation: Excitation, robot: Robot) -> dict[str, Any]:
-    asked = demand(robot, excitation.rig, excitation.position, excitation.rate)
-    return {
-        "robot": robot.name,
-        "rig": excitation.rig,
-        "rate_hz": excitation.rate,
-        "samples": len(excitation),
-        "digest": excitation.digest,
-        "description": excitation.description,
-        "largest": {
-            "lower_rad": asked.position.min(axis=0).tolist(),
-            "upper_rad": asked.position.max(axis=0).tolist(),
-            "speed_rad_s": np.abs(asked.velocity).max(axis=0).tolist(),
-            "torque_nm": np.abs(asked.torque).max(axis=0).tolist(),
-        },
-    }
 
 
 def _play(args: Play) -> None:

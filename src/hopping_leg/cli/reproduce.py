@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 from hopping_leg import io
 from hopping_leg.cli import options
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import Robot, load_robot, parent_robot
+from hopping_leg.robot import Robot, load_robot
 from hopping_leg.terminal import Progress, plain_console
 
 if TYPE_CHECKING:
@@ -52,14 +52,10 @@ class Reproduce:
     recordings, robots and trainings; default: runs/reproduce or runs/quick."""
     seed: int = 0
     """Seed of the trainings; the trials' seeds follow from another number."""
-    twin: str | None = None
-    """Robot file of the leg that plays the real one; default: one that is drawn."""
     steps: int = 1_200_000
     """Control steps of experience of each training."""
     quick: bool = False
     """Take every step as shortly as can be, to see that it works; the numbers mean nothing."""
-    json: Path | None = None
-    """File for every number of the evaluation, besides evaluation.json."""
 
     @property
     def folder(self) -> Path:
@@ -74,12 +70,14 @@ def run(args: Reproduce) -> None:
     from hopping_leg.evaluate import tables
     from hopping_leg.evaluate.report import write_report
     from hopping_leg.locks import hold_folder
+    from hopping_leg.sim.randomization import draw_twin
 
     start, folder = time.monotonic(), args.folder
     notes = [NOTHING_MEANT] if args.quick else []
     options.at_least(0, seed=args.seed)
     options.at_least(1, steps=args.steps)
-    twin, believed = _twin(args)
+    drawn = draw_twin(0)
+    twin, believed = drawn.robot, str(drawn.tree["extends"])
     with hold_folder(folder, UsageError):
         _check_same(args)
         recordings = list(_record(twin, believed, folder))
@@ -93,16 +91,16 @@ def run(args: Reproduce) -> None:
     others = ("fast",) if args.quick else shipped_policies()
     evaluate.run(
         evaluate.Evaluate(
-            controllers=(f"identified={policy}", *others, ENERGY_SHAPING),
+            (f"identified={policy}", *others, ENERGY_SHAPING),
             robot=identified,
             seeds=1 if args.quick else 5,
             out=folder,
-            json=args.json,
             floor="soft" if args.quick else "both",
             video=not args.quick,
         ),
         notes,
     )
+    options.say(f"On {twin.name}:")
     tables.print_evaluation(plain_console(), judged)
     options.say(
         *notes,
@@ -113,27 +111,10 @@ def run(args: Reproduce) -> None:
     )
 
 
-def _twin(args: Reproduce) -> tuple[Robot, str]:
-    """Return the leg that plays the real one, and what is believed of it: a name or file."""
-    from hopping_leg.sim.randomization import draw_twin
-
-    if args.twin is None:
-        drawn = draw_twin(0)
-        return drawn.robot, str(drawn.tree["extends"])
-    robot, parent = load_robot(args.twin), parent_robot(args.twin)
-    robot.require_leg()
-    if parent is None:
-        raise UsageError(
-            f"{args.twin} extends no robot, so that nothing says what is believed of it before it"
-            " is identified; let its file extend one, e.g. legv2."
-        )
-    return robot, parent
-
-
 def _check_same(args: Reproduce) -> None:
     """Refuse a folder that holds a run of other options."""
     file = args.folder / "options.json"
-    asked = io.plain({k: v for k, v in asdict(args).items() if k not in ("out", "json")})
+    asked = {k: v for k, v in asdict(args).items() if k != "out"}
     if file.exists() and io.parse_json(file.read_bytes(), str(file)) != asked:
         raise UsageError(f"{args.folder} holds a run with other options; give another --out.")
     io.write_json(file, asked)
@@ -205,7 +186,7 @@ def _hop(
     from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller
     from hopping_leg.evaluate import runner
     from hopping_leg.evaluate.runner import Entry
-    from hopping_leg.sim import NO_NOISE, NoiseAndDelay
+    from hopping_leg.sim import NO_NOISE
 
     told: dict[str, tuple[str | Path, str]] = {**policies}
     told[ENERGY_SHAPING] = ENERGY_SHAPING, believed
@@ -213,11 +194,10 @@ def _hop(
         Entry(name, load_controller(what, load_robot(robot), other="accept"))
         for name, (what, robot) in told.items()
     ]
-    noise = NoiseAndDelay() if twin.reality.neutral else NO_NOISE  # a twin brings its own
     with Progress(parts=len(entries)) as bar:
         return runner.evaluate(
             entries,
-            RolloutConfig(twin, noise),
+            RolloutConfig(twin, NO_NOISE),  # a twin brings its own
             commands=COMMANDS,
             repeats=1 if args.quick else 3,
             seed=_FIRST_SEED,
