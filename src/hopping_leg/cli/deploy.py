@@ -6,9 +6,8 @@ as do Ctrl-C, SIGTERM and the end of the terminal; a second signal brakes and le
 until you call this again. Everything is recorded, also when the process is killed:
 `hop report` reads the trace, or the flight recording that a killed run leaves behind.
 
-CONTROLLER is a name (fast, paper, energy-shaping), a policy (.onnx), a gain file (.toml), a Python
-class (path/to/file.py:Class), or a joint trajectory from `hop record` (.parquet), which a joint PD
-tracks.
+CONTROLLER is a name (fast, paper, energy-shaping), a policy (.onnx), a gain file (.toml), or a
+Python class (path/to/file.py:Class). `hop record play --transport` plays joint trajectories.
 
 Examples:
   hop deploy fast --transport /dev/fdcanusb --command 0.30 --seconds 20
@@ -16,17 +15,16 @@ Examples:
   hop deploy runs/mine/policy.onnx --transport /dev/pts/5 --live --yes
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
 
 from hopping_leg.cli import motors, options
-from hopping_leg.controllers import command_schedule, fallback, joint_pd, policy, protocol, registry
+from hopping_leg.controllers import command_schedule, fallback, policy, protocol, registry
 from hopping_leg.deploy import hardware_trials, keyboard, safety_limits, stop_reasons
 from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
 from hopping_leg.errors import HardwareError, PolicyError, TraceError, UsageError
-from hopping_leg.identify.excitation import load_excitation
 from hopping_leg.robot import Robot, SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE, SoftLimiter
 
@@ -39,7 +37,7 @@ class Deploy:
     """What runs, on which leg, for how long."""
 
     controller: tyro.conf.Positional[str]
-    """A name, a file (.onnx, .toml, .parquet), or a Python class as FILE.py:CLASS."""
+    """A name, a file (.onnx, .toml), or a Python class as FILE.py:CLASS."""
     transport: str
     """Path of an fdcanusb, or interface:channel of python-can."""
     robot: options.OwnRobot = None
@@ -48,7 +46,7 @@ class Deploy:
     schedule: str | None = None
     """Heights in turn instead, each with its seconds, e.g. 0.25:5,0.30:5."""
     seconds: float | None = None
-    """Time to hop, s; default 10, or as long as schedule or trajectory."""
+    """Time to hop, s; default 10, or as long as the schedule."""
     live: bool = False
     """Change the height while the leg hops: + and -, or the arrows."""
     soft_limits: bool = True
@@ -82,62 +80,44 @@ def run(args: Deploy) -> None:
     options.say_next(["hop", "report", done.path])
     if cause.reason not in (stop_reasons.Reason.FINISHED, stop_reasons.Reason.OPERATOR_STOP):
         errors = [event.get("controller_error", "") for event in events]
-        words = [f"The leg was stopped: {cause}", *errors, _emulated(args, cause), done.complaint]
+        words = [f"The leg was stopped: {cause}", *errors, done.complaint]
         raise HardwareError(" ".join(filter(None, words)))
     if done.complaint:
         raise TraceError(done.complaint)
 
 
-def _emulated(args: Deploy, cause: stop_reasons.Cause) -> str:
-    """Return where to look if drives did not answer that run on this computer."""
-    silent = (stop_reasons.Reason.REPLIES_MISSING, stop_reasons.Reason.DRIVE_TIMEOUT)
-    terminal = Path(args.transport).resolve().is_relative_to("/dev/pts")
-    if terminal and cause.reason in silent:
-        return "If this computer was late, `hop emulate` says by how much."
-    return ""
-
-
 def _plan(
     args: Deploy, robot: Robot
-) -> tuple[protocol.Controller, float, command_schedule.CommandSchedule, float]:
-    """Return controller, rate, schedule and seconds; whatever is wrong with them is found here."""
+) -> tuple[protocol.Controller, command_schedule.CommandSchedule, float]:
+    """Return controller, schedule and seconds; whatever is wrong with them is found here."""
     if args.schedule is not None and args.command is not None:
         raise UsageError("--command and --schedule exclude each other; give one of them.")
-    controller: protocol.Controller
-    if args.controller.endswith(".parquet"):
-        excitation = load_excitation(Path(args.controller))
-        controller = joint_pd.JointPD(excitation.position, excitation.velocity)
-        rate, seconds = excitation.rate, len(excitation) / excitation.rate
-    else:
-        controller = registry.load_controller(
-            args.controller, robot, other="warn" if args.other_robot else "refuse"
+    controller = registry.load_controller(
+        args.controller, robot, other="warn" if args.other_robot else "refuse"
+    )
+    if isinstance(controller, policy.Policy) and controller.seconds > _MOST_SHARE / CONTROL_RATE:
+        raise PolicyError(
+            f"{args.controller} takes {controller.seconds * 1e3:.1f} ms of a control period of"
+            f" {1e3 / CONTROL_RATE:g} ms on this computer; make it smaller, or end other programs."
         )
-        rate, seconds = CONTROL_RATE, _SECONDS
-        if isinstance(controller, policy.Policy) and controller.seconds > _MOST_SHARE / rate:
-            raise PolicyError(
-                f"{args.controller} takes {controller.seconds * 1e3:.1f} ms of a control period of"
-                f" {1e3 / rate:g} ms on this computer; make it smaller, or end other programs."
-            )
     valid = command_schedule.command_range(controller, robot)
     if args.schedule is not None:
         schedule = command_schedule.CommandSchedule.parse(args.schedule)
-        seconds = schedule.seconds
     else:
         middle = sum(valid) / 2 if isinstance(controller, policy.Policy) else 0.30
         height = middle if args.command is None else args.command
         schedule = command_schedule.CommandSchedule(((height, _SECONDS),))
     command_schedule.check_schedule(schedule, valid, controller.name)
-    seconds = args.seconds or seconds
+    seconds = args.seconds or (_SECONDS if args.schedule is None else schedule.seconds)
     if not 0 < seconds <= 3600:
         raise UsageError(f"--seconds is {seconds:g} but must lie between 0 and 3600.")
-    return controller, rate, schedule, seconds
+    return controller, schedule, seconds
 
 
 def _perform(
     args: Deploy,
     robot: Robot,
     controller: protocol.Controller,
-    rate: float,
     schedule: command_schedule.CommandSchedule,
     seconds: float,
 ) -> hardware_trials.Performance:
@@ -146,15 +126,16 @@ def _perform(
         height = keyboard.LiveHeight(
             schedule.at(0.0), command_schedule.command_range(controller, robot)
         )
-    poses = hopping_poses(robot)
-    if isinstance(controller, joint_pd.JointPD):
-        poses = replace(poses, start=controller.position[0])
     limiter = SoftLimiter(robot, SoftLimits()) if args.soft_limits else None
-    timing = SequenceTiming(hop=seconds)
-    hops = fallback.with_fallback(controller, robot)
-    checked = None if isinstance(controller, joint_pd.JointPD) else robot
-    sequence = MotionSequence(hops, height or schedule, poses, limiter, timing, checked=checked)
-    limits = safety_limits.hopping_limits(robot, rate)
+    sequence = MotionSequence(
+        fallback.with_fallback(controller, robot),
+        height or schedule,
+        hopping_poses(robot),
+        limiter,
+        SequenceTiming(hop=seconds),
+        checked=robot,
+    )
+    limits = safety_limits.hopping_limits(robot, CONTROL_RATE)
     with motors.connect(robot, args.transport) as link:
         drives, name = motors.check(link, robot, limits), controller.name
         motors.ask(
@@ -163,7 +144,7 @@ def _perform(
             yes=args.yes,
         )
         header = hardware_trials.header_of(
-            robot, controller, rate, transport=args.transport, drives=drives
+            robot, controller, CONTROL_RATE, transport=args.transport, drives=drives
         )
         return hardware_trials.perform(
             link,

@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Conditions:
-    """Controllers, and the robot, noise and physics that they are measured with."""
+class Evaluate:
+    """What is judged, where, under which conditions and how often."""
 
     controllers: tyro.conf.Positional[tuple[str, ...]]
     """Names (energy-shaping, paper, fast, ...), .onnx files, a quoted pattern of them, or Python
@@ -59,6 +59,21 @@ class Conditions:
     """Control rate, Hz."""
     threads: int = 0
     """Threads of the physics, 0 for all cores; results do not depend on it."""
+    suite: Literal["paper", "robustness"] = "paper"
+    """The paper's trials, or those of changed worlds."""
+    axes: tuple[str, ...] = ()
+    """Axes of the suite robustness by name; default: all."""
+    out: Path | None = None
+    """Folder for evaluation.json, report.html and traces/, instead of naming each."""
+    report: Path | None = None
+    """File for the report, one self-contained HTML page."""
+    traces: Path | None = None
+    """Folder for the runs as Parquet, for `hop report` and your own tools."""
+    floor: Literal["soft", "stiff", "both"] = "both"
+    """The robot's own contact (soft), MuJoCo's default (stiff), or all trials on the first and
+    the fixed ones on the second."""
+    video: bool = True
+    """Put a short video of each controller into the report, if OpenGL is available."""
 
     def load(self) -> "tuple[list[Entry], RolloutConfig]":
         """Return the controllers and how they are rolled out; a wrong option is a UsageError."""
@@ -75,27 +90,6 @@ class Conditions:
             rate=self.rate, timestep=self.timestep, threads=self.threads,
         )  # fmt: skip
         return load_entries(self.controllers, robot, self.rate), setup
-
-
-@dataclass(frozen=True)
-class Evaluate(Conditions):
-    """What is judged, where and how often."""
-
-    suite: Literal["paper", "robustness"] = "paper"
-    """The paper's trials, or those of changed worlds."""
-    axes: tuple[str, ...] = ()
-    """Axes of the suite robustness by name; default: all."""
-    out: Path | None = None
-    """Folder for evaluation.json, report.html and traces/, instead of naming each."""
-    report: Path | None = None
-    """File for the report, one self-contained HTML page."""
-    traces: Path | None = None
-    """Folder for the runs as Parquet, for `hop report` and your own tools."""
-    floor: Literal["soft", "stiff", "both"] = "both"
-    """The robot's own contact (soft), MuJoCo's default (stiff), or all trials on the first and
-    the fixed ones on the second."""
-    video: bool = True
-    """Put a short video of each controller into the report, if OpenGL is available."""
 
 
 def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
