@@ -3,31 +3,24 @@
 import io
 import time
 
-import numpy as np
 import pytest
 from rich.console import Console
 from rich.table import Table
 
 from hopping_leg.cli.options import say, show_table
-from hopping_leg.rl.learner import RecentHops
-from hopping_leg.rl.train import TrainingProgress
 from hopping_leg.terminal import Progress, print_table, said_if_slow
 
 
-def test_a_training_tells_only_what_it_knows(monkeypatch):
-    now, hops = 0.0, RecentHops()
+def test_the_time_left_follows_the_pace(monkeypatch):
+    now = 0.0
     monkeypatch.setattr(time, "monotonic", lambda: now)
-    progress = TrainingProgress("fast seed 0")
-    progress.prepare("trying legs", 1.0)
-    progress.update(0.25, 0, hops, "")
-    assert progress.text == "fast seed 0 25 % · 0 hops"
+    progress = Progress("fast seed 0")
+    progress.show("fast seed 0", 1.0, about=", trying legs")
+    progress.show("fast seed 0", 0.25)
+    assert progress.text == "fast seed 0 25 %"
     now = 60.0
-    hops.add(np.array([0.012, np.nan, -0.012]))
-    progress.update(0.5, 1200, hops, " · best snapshot 9 mm")
-    assert progress.text == (
-        "fast seed 0 50 % · 2 hops · apex error 12 mm · 20 steps/s · best snapshot 9 mm"
-        " · 0:02:00 left"
-    )
+    progress.show("fast seed 0", 0.5, "2 hops")
+    assert progress.text == "fast seed 0 50 % · 2 hops · 0:02:00 left"
 
 
 def test_lines_come_while_nothing_is_reported_and_say_which_part_it_is(capsys, monkeypatch):

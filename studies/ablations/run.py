@@ -19,9 +19,9 @@ from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.runner import software_versions
 from hopping_leg.rl.onnx_export import Actor, build_policy
 from hopping_leg.rl.policy_evaluation import calibrate
+from hopping_leg.rl.reach import within_reach
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes.fast import FAST
-from hopping_leg.rl.stages import within_reach
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
 from studies.ablations import ppo
 from studies.shared import Row, once

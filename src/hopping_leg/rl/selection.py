@@ -30,11 +30,7 @@ class Selection:
     def add(self, steps: int, minutes: float, content: bytes) -> dict[str, Any]:
         """Keep and try a policy file; return its row."""
         io.write_atomically(self._folder.snapshot(steps), content)
-        row = {
-            "steps": steps,
-            "minutes": minutes,
-            **self.trials(content),
-        }
+        row = {"steps": steps, "minutes": minutes, **self.trials(content)}
         self.rows.append(row)
         return row
 
@@ -56,13 +52,6 @@ class Selection:
     def final(self, content: bytes) -> dict[str, Any]:
         """Try a policy file on the seeds that judge the best."""
         return self.trials(content, policy_evaluation.FINAL_SEEDS)
-
-    def describe(self) -> str:
-        """Return what to show of the best snapshot so far, or nothing."""
-        if not self.rows:
-            return ""
-        best = min(self.rows, key=lambda row: float(row["score_m"]))
-        return f" · best snapshot {1000 * best['score_m']:.0f} mm"
 
     def trials(
         self, content: bytes, seeds: tuple[int, ...] = (policy_evaluation.FIRST_SEED,)

@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,52 +14,15 @@ from stable_baselines3.common.logger import configure
 from hopping_leg import errors, io, locks
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.envs import TaskLeg
-from hopping_leg.rl import (
-    onnx_export,
-    policy_evaluation,
-    run_folder,
-    stages,
-    training_legs,
-)
+from hopping_leg.rl import onnx_export, policy_evaluation, reach, run_folder
 from hopping_leg.rl.checkpoint import write_checkpoint
-from hopping_leg.rl.learner import RecentHops
+from hopping_leg.rl.distillation.dagger import DaggerConfig
 from hopping_leg.rl.model_card import write_card
 from hopping_leg.rl.policy_evaluation import calibrate
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.selection import Selection
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.terminal import Progress
-
-
-class TrainingProgress(Progress):
-    """Live numbers of a training, as a context manager."""
-
-    def __init__(self, title: str, *, quiet: bool = False) -> None:
-        super().__init__(f"{title}, preparing", quiet=quiet)
-        self._title = title
-        self._first: tuple[float, int] | None = None
-
-    def update(self, share: float, steps: int, hops: RecentHops, best: str) -> None:
-        """Show the share that is done, 0 to 1, and how accurate the latest hops are."""
-        if self._first is None:
-            self._first = self.passed, steps
-        seconds, more = self.passed - self._first[0], steps - self._first[1]
-        note = f"{hops.count} hops"
-        if math.isfinite(hops.mean_error):
-            note += f" · apex error {1000 * hops.mean_error:.0f} mm"
-        if more > 0:
-            note += f" · {more / max(seconds, 1e-9):.0f} steps/s"
-        note += best
-        self.show(self._title, share, note)
-
-    def prepare(self, what: str, share: float) -> None:
-        """Show the share of what is done before the training, 0 to 1."""
-        self.show(self._title, share, about=f", {what}")
-
-    def finish(self, what: str) -> None:
-        """Show what is done after the training itself."""
-        self.show(self._title, 1.0, about=f", {what}")
-
 
 _RANGE_LEGS, _RANGE_STRIDE = 24, 5
 """Legs of any size whose hops tell a policy's range of inputs, and which of their heights do."""
@@ -78,6 +41,43 @@ class Trained:
     """Wall-clock time of the training, pauses excluded."""
     steps: int
     """Control steps of experience."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A part of a distillation, with a score that it has to reach."""
+
+    name: str
+    until: float
+    """Share of the training with which it ends."""
+    score: str
+    """What decides, in words; in m, less is better."""
+    must_score: float
+    """Largest score with which it is passed, m."""
+
+    def ended(self, score: float, seconds: float) -> dict[str, Any]:
+        """Return its result after so much time, s, as JSON values."""
+        row = asdict(self)
+        must = {"must_score_m": row.pop("must_score"), "score_m": score}
+        return {**row, **must, "passed": score <= self.must_score, "seconds": seconds}
+
+
+def stages_of(recipe: Recipe) -> tuple[Stage, ...]:
+    """Return the stages of a distillation in order; no other recipe has any.
+
+    First the teacher alone has to hop. Then the student hops, at first with the teacher's help,
+    then alone, and at last its command is calibrated.
+    """
+    if not isinstance(recipe.algorithm, DaggerConfig):
+        return ()
+    worst = "median error and scatter at the worst height"
+    helped = 0.15 if recipe.legs == "any" else 0.03  # legs of any size take longer
+    return (
+        Stage("teacher", 0.0, worst, 0.006),
+        Stage("student, helped", recipe.algorithm.mixing_share, "mean error of its hops", helped),
+        Stage("student, alone", 1.0, worst, 0.030),
+        Stage("student, calibrated", 1.0, worst, 0.010),
+    )
 
 
 def train(
@@ -128,16 +128,18 @@ def train(
         )
     began = time.monotonic()
     torch.set_num_threads(max(threads, 1))
-    with TrainingProgress(f"{recipe.name} seed {seed}", quiet=quiet) as progress:
+    title = f"{recipe.name} seed {seed}"
+    with Progress(f"{title}, preparing", quiet=quiet) as progress:
         fitted = recipe.fit(robot)
         folder = run_folder.RunFolder(out, fitted, robot, seed, minutes, source)
-        recipe, worst_score = stages.within_reach(fitted, robot)
+        recipe, worst_score = reach.within_reach(fitted, robot)
         run_folder.is_new(out, resume=resume)  # or refused, before a lock is put into it
         with locks.hold_folder(out, errors.UsageError):
             tree = folder.begin(resume=resume)
-            legs = training_legs.find_legs(
-                fitted, seed, folder.path / "legs.json", max(threads, 2), ray, progress.prepare
-            )
+            legs = reach.find_legs(
+                fitted, seed, out / "legs.json", max(threads, 2), ray,
+                lambda share: progress.show(title, share, about=", trying legs"),
+            )  # fmt: skip
             trainer = Trainer(recipe, robot, seed, folder, minutes, threads, began, legs)
             trainer.end_stage(worst_score)
             trainer.learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
@@ -169,15 +171,15 @@ class Trainer:
         if minutes is not None:
             self.learner.remaining = lambda: max(0.0, 1 - self.elapsed / self._seconds)
         self.selection = Selection(recipe, robot, folder)
-        self._stages = stages.stages_of(recipe)
+        self._stages = stages_of(recipe)
         self.stages: list[dict[str, Any]] = []
         """How the stages of a distillation ended so far, as JSON values."""
         self.seconds: dict[str, float] = {"before the first rollout": time.monotonic() - began}
         """Time spent on each part since the run began or was resumed."""
         self._earlier = 0.0
         self._began, self._saved = began, time.monotonic()
-        self._shown = 0.0
-        self._progress: TrainingProgress | None = None
+        self._shown, self._title = 0.0, f"{recipe.name} seed {seed}"
+        self._progress: Progress | None = None
         self.on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None
 
     @property
@@ -192,7 +194,7 @@ class Trainer:
         self._earlier = tree["elapsed"]
         self._began = time.monotonic()
 
-    def run(self, progress: TrainingProgress) -> Trained:
+    def run(self, progress: Progress) -> Trained:
         """Learn until steps or time are used up; write the selected policy."""
         self._progress = progress
         learner, recipe = self.learner, self.recipe
@@ -201,7 +203,7 @@ class Trainer:
         self._evaluate()
         learner.logger.close()
         self._show(force=True)
-        progress.finish("selecting and calibrating")
+        progress.show(self._title, 1.0, about=", selecting and calibrating")
         with self._timed("selection and calibration"):
             content, selected = self._finish()
         minutes, steps = self.elapsed / 60, int(learner.num_timesteps)
@@ -317,8 +319,13 @@ class Trainer:
         if self._progress is None or (now - self._shown < SHOWN_EVERY and not force):
             return
         self._shown = now
-        steps = int(self.learner.num_timesteps)
+        steps, hops = int(self.learner.num_timesteps), self.learner.recent_hops
         share = max(steps / self.recipe.schedule.steps, self.elapsed / self._seconds)
-        self._progress.update(
-            min(share, 1.0), steps, self.learner.recent_hops, self.selection.describe()
-        )
+        notes = [f"{hops.count} hops"]
+        if math.isfinite(hops.mean_error):
+            notes.append(f"apex error {1000 * hops.mean_error:.0f} mm")
+        notes.append(f"{steps / self.elapsed:.0f} steps/s")
+        if self.selection.rows:
+            best = min(float(row["score_m"]) for row in self.selection.rows)
+            notes.append(f"best snapshot {1000 * best:.0f} mm")
+        self._progress.show(self._title, min(share, 1.0), " · ".join(notes))

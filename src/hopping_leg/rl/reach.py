@@ -1,8 +1,9 @@
-"""The legs of a training for any leg: each is drawn, and asked for the heights its teacher reaches.
+"""What a teacher reaches: heights that it does not reach on a leg are not asked of its student.
 
-The teacher hops on every leg at heights of the whole range; the longest run of those that it
-reaches is what the leg is asked for in training. Legs with fewer than two of them are left out.
-What was found is kept in a file, so that a training that goes on does not look again.
+The teacher hops at heights of the whole range; the longest run of those that it reaches is what the
+leg is asked for in training. A training for any leg draws its legs, and leaves out those with fewer
+than two such heights; what was found is kept in a file, so that a training that goes on does not
+look again.
 """
 
 import itertools
@@ -15,23 +16,67 @@ import numpy as np
 from hopping_leg import io
 from hopping_leg.controllers.mpc import HopShape, Planning, TrueStateMpc
 from hopping_leg.envs.task import TaskLeg
+from hopping_leg.errors import UsageError
 from hopping_leg.rl.distillation.dagger import DaggerConfig
-from hopping_leg.rl.policy_evaluation import CommandResult, evaluate_policy
+from hopping_leg.rl.onnx_export import every_centimetre
+from hopping_leg.rl.policy_evaluation import CommandResult, command_score, evaluate_policy
 from hopping_leg.rl.recipe import Recipe
+from hopping_leg.robot import Robot
 from hopping_leg.sim import NO_NOISE, compile_physics
 from hopping_leg.sim.any_leg import draw_any_leg
 from hopping_leg.workers import ProcessWorkers, RayWorkers, Workers
 
-_HEIGHTS, _LEAST = 9, 2  # tried, and reached at least
+_REACHED = 0.005
+"""Median error with which the teacher reaches a height on the robot, m."""
+
+_HEIGHTS, _LEAST = 9, 2  # tried on a drawn leg, and reached at least
 _SECONDS, _STEP = 3.5, 5e-4
-_REACHED = 0.006
-"""Median error with which the teacher reaches a height of a leg of the paper's size, m."""
+_REACHED_DRAWN = 0.006
+"""The same on a drawn leg of the paper's size, m."""
 
 _AT_ONCE, _ROUND = 8, 64
 """Legs in one task of a worker, and in all tasks until what they found is kept."""
 
 _BETWEEN_SEEDS = 1_000_000
 """Legs of which no two trainings draw the same."""
+
+
+def within_reach(recipe: Recipe, robot: Robot) -> tuple[Recipe, float]:
+    """Return a recipe for the heights that its teacher reaches, and the teacher's worst score, m.
+
+    A recipe without a teacher stays as it is. The heights are the longest run of centimetres
+    without a skipped hop and with a small median error.
+
+    Raises:
+        UsageError: There are none.
+    """
+    if not isinstance(recipe.algorithm, DaggerConfig):
+        return recipe, 0.0
+    rate, heights = recipe.task.rate, every_centimetre(recipe.task.command_bounds)
+    teacher = TrueStateMpc(robot, recipe.algorithm.teacher, rate=rate)
+    results = evaluate_policy(teacher, robot, heights, rate=rate, legs=2, seconds=5.0)
+    longest = _longest_run(results, lambda result: _hops(result, _REACHED))
+    if len(longest) < 3:
+        raise UsageError(
+            f"The teacher reaches no range of heights between {heights[0]:g} and {heights[-1]:g} m"
+            f" on {robot.name}; check masses, lengths and motors with `hop robots check`, or give"
+            " other --heights."
+        )
+    if len(longest) < len(heights):
+        recipe = recipe.within(longest[0].command_m, longest[-1].command_m)
+    return recipe, max(map(command_score, longest))
+
+
+def _longest_run(
+    results: list[CommandResult], reached: Callable[[CommandResult], bool]
+) -> list[CommandResult]:
+    runs = [list(run) for good, run in itertools.groupby(results, key=reached) if good]
+    return max(runs, key=len, default=[])
+
+
+def _hops(result: CommandResult, most: float) -> bool:
+    """Tell whether hops came without a skipped one and with at most so much median error, m."""
+    return result.hops > 0 and result.skipped_hops == 0 and abs(result.median_error_m) <= most
 
 
 @dataclass(frozen=True)
@@ -57,19 +102,11 @@ def find_reach(
         TrueStateMpc(robot, shape, planning), robot, asked, legs=1, seconds=_SECONDS,
         disturbance=NO_NOISE, timestep=_STEP, threads=1,
     )  # fmt: skip
-    runs = [list(run) for good, run in itertools.groupby(results, key=_reached(robot.size)) if good]
-    longest = max(runs, key=len, default=[])
+    most = robot.size * _REACHED_DRAWN
+    longest = _longest_run(results, lambda r: _hops(r, most) and r.body_contact_ticks == 0)
     if len(longest) < _LEAST:
         return None
     return Reach(leg, longest[0].command_m, longest[-1].command_m)
-
-
-def _reached(scale: float) -> Callable[[CommandResult], bool]:
-    def judge(result: CommandResult) -> bool:
-        hops = result.hops > 0 and result.skipped_hops == 0 and result.body_contact_ticks == 0
-        return hops and abs(result.median_error_m) <= scale * _REACHED
-
-    return judge
 
 
 def _find_some(
@@ -122,7 +159,7 @@ def find_legs(
     file: Path,
     processes: int,
     ray: str | None,
-    on_progress: Callable[[str, float], None],
+    on_progress: Callable[[float], None],
 ) -> list[TaskLeg]:
     """Return the legs of a training for any leg, none for others.
 
@@ -132,7 +169,7 @@ def find_legs(
         file: Keeps what is found.
         processes: Of this machine, which find out what the teacher reaches.
         ray: Address of a Ray cluster that does it instead.
-        on_progress: Told what is done, and the share of it, 0 to 1.
+        on_progress: Told the share that is done, 0 to 1.
 
     Raises:
         UsageError: The file is damaged.
@@ -147,7 +184,7 @@ def find_legs(
         workers = local if ray is None else RayWorkers(ray)
         found = reach_of_legs(
             count, seed, recipe.task.command_bounds, teacher, workers, file,
-            lambda known: on_progress("trying legs", known / count),
+            lambda known: on_progress(known / count),
         )  # fmt: skip
     return [task_leg(reach) for reach in found]
 
