@@ -76,14 +76,11 @@ def test_a_fault_is_a_sentence_and_an_exit_code(emulate, tmp_path, refused):
     ("words", "sentence"),
     [
         (["fasst"], "Did you mean 'fast'"),
-        (["missing.onnx"], "Cannot read policy file"),
         (["fast", "--command", "0.6"], f"from {FAST.command_low:.2f} to {FAST.command_high:.2f} m"),
         (["fast", "--robot", "legv2"], f"was trained on robot '{FAST.robot}'"),
         (["energy-shaping", "--schedule", "0.3"], "is no step of a schedule"),
         (["energy-shaping", "--schedule", "0.3:2", "--command", "0.3"], "exclude each other"),
-        (["energy-shaping", "--command", "1.0"], "outside of what"),
         (["energy-shaping", "--seconds", "-1"], "--seconds is -1"),
-        (["energy-shaping", "--robot", "doublependulum"], "cannot hop"),
         (["energy-shaping"], "add --yes"),
     ],
 )
@@ -113,17 +110,8 @@ def test_a_recording_from_motors_is_one_that_identification_takes(emulate, tmp_p
     emulate(robot="legv2", faults=(Fault("drop_reply", at=1.0, drive="hip"),))
     file, played = write_sine(tmp_path, rig, 400)
     position = played.position
-    words = [
-        "record",
-        "play",
-        str(file),
-        "--transport",
-        "/dev/leg",
-        "--yes",
-        "--out",
-        str(tmp_path / "r"),
-    ]
-    assert main(words) == 0
+    words = ["record", "play", str(file), "--transport", "/dev/leg", "--yes"]
+    assert main([*words, "--out", str(tmp_path / "r")]) == 0
     recording = load_recording(tmp_path / "r" / "legv2-sine.parquet")
     assert recording.metadata.rig == rig
     assert recording.metadata.robot == "legv2"
@@ -159,13 +147,8 @@ def test_the_emulator_names_the_terminal_and_ends_with_ctrl_c(tmp_path):
         assert first == f"Drives 1 and 2 of legv1 behind {link}\n"
         assert link.resolve().parent == Path("/dev/pts")
         assert process.stdout.readline() == "Next:\n"
-        said = process.stdout.readline().split()
-        assert said == [
-            "hop",
-            "deploy",
-            "energy-shaping",
-            *f"--robot legv1 --transport {link}".split(),
-        ]
+        said = process.stdout.readline().strip()
+        assert said == f"hop deploy energy-shaping --robot legv1 --transport {link}"
         process.send_signal(signal.SIGINT)
         rest, errors = process.communicate(timeout=30)
     finally:
@@ -189,14 +172,10 @@ EMULATE, TRANSPORT = ["emulate", "--seconds", "0"], ["doctor", "--transport"]
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ([*EMULATE, "--robot", "doublependulum"], "cannot hop"),
         ([*EMULATE, "--start-pose", "x"], "There is no pose 'x'"),
         ([*EMULATE, "--faults", "none.toml"], "no fault script none.toml"),
-        ([*EMULATE, "--seed", "-1"], "--seed is -1"),
         ([*TRANSPORT, "/none/port"], "There is no serial port /none/port"),
-        ([*TRANSPORT, "usb"], "There is no transport 'usb'"),
         ([*TRANSPORT, "socketcn:can0"], "python-can has no interface 'socketcn'"),
-        ([*TRANSPORT, "/dev/null"], "Cannot open the adapter"),
     ],
 )
 def test_a_wrong_option_or_transport_is_one_sentence(refused, words, sentence):
@@ -237,10 +216,7 @@ def test_wrong_input_is_one_sentence(tmp_path, refused):
     file, _ = write_sine(tmp_path, "rail", 300)
     for words, sentence in (
         ([], "No excitation was given"),
-        ([str(tmp_path / "none.parquet")], "none.parquet"),
-        ([str(file), "--robot", "twinn"], "Did you mean 'twin'"),
         ([str(file), "--believed", "legv9"], "There is no robot 'legv9'"),
-        ([str(file), "--seed", "-1"], "--seed is -1"),
         ([str(file), "--damping", "-1", "0"], "must be zero or more"),
     ):
         refused(["record", "play", *words, "--out", tmp_path / "out"], sentence)

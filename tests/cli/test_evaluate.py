@@ -38,9 +38,7 @@ def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys)
         (["--commands", "0.5"], "trained for 0.29 to 0.31 m"),
         (["--commands", "high"], "--commands"),
         (["--seed", "-1"], "--seed is -1"),
-        (["--robot", "legv9"], "There is no robot 'legv9'"),
         (["--threads", "-1"], "'threads' is -1"),
-        (["--rate", "0"], "'rate' is 0"),
         (["--timestep", "0.003"], "does not divide"),
     ],
 )
@@ -60,11 +58,6 @@ def test_robustness_leaves_numbers_and_figure(spring, tmp_path, capsys):
     assert "--axes pushes" in data["command"]
     assert (out / "robustness.svg").read_bytes().startswith(b"<?xml")
     assert "overall" in capsys.readouterr().out
-
-
-def test_a_figure_of_nothing_is_refused(tmp_path, refused):
-    for words in ([], [str(tmp_path / "none.parquet")]):
-        refused(["report", *words], "")
 
 
 @pytest.mark.parametrize("on", [True, False])

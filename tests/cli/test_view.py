@@ -14,9 +14,6 @@ pytest.importorskip("viser", reason="the extra 'view' is not installed")
     [
         (["nobody"], "There is no controller 'nobody'"),
         (["fast", "paper", "fast"], "give one, or two side by side"),
-        (["--robot", "nothing"], "nothing"),
-        (["--robot", "doublependulum"], "cannot hop"),
-        (["--trace", "none.parquet"], "There is no trace file none.parquet"),
         (["--box", "none"], "There is no none"),
         (["--trace", "a.parquet", "--box", "runs"], "exclude each other"),
         (["--port", "70000"], "between 0 and 65535"),
