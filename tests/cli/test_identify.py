@@ -109,9 +109,9 @@ def write_bad(folder):
         (["good.csv", "--search", "cmaes"], "Did you mean 'cma'"),
         (["good.csv", "--bounds", "hip.friction=low,high"], "gives no bounds"),
         (["good.csv", "--starts", "0"], "A search needs a start"),
-        (["good.csv", "--json", "good.toml"], "would replace an input"),
+        (["good.csv", "--json", "good.toml"], "is an input"),
         (["good.csv", "--out", "leg.json"], "must end in .toml"),
-        (["good.csv", "--out", "good.toml"], "would replace an input"),
+        (["good.csv", "--out", "good.toml"], "is an input"),
     ],
 )
 def test_bad_input_is_one_sentence_and_overwrites_nothing(words, sentence, tmp_path, refused):

@@ -17,17 +17,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import tyro
-from rich.table import Column
 
 from hopping_leg import errors, io
-from hopping_leg.cli.options import JsonFile, command_line, save_json, say, say_next, show_table
+from hopping_leg.cli.options import (
+    JsonFile,
+    command_line,
+    save_json,
+    say,
+    say_next,
+    say_written,
+    show_table,
+)
 from hopping_leg.robot import JOINTS, load_robot
 from hopping_leg.terminal import Progress, said_if_slow
 
 if TYPE_CHECKING:
     from hopping_leg.identify.result import Identified
-
-_FILES = {"out": "Robot", "json": "Numbers", "report": "Report"}
 
 
 @dataclass(frozen=True)
@@ -89,8 +94,7 @@ def run(args: Identify) -> None:
     recordings = [recording.load_recording(path) for path in args.recordings]
     judges = [recording.load_recording(path) for path in args.validate]
     origin = args.robot or plan.robot_of([*recordings, *judges])
-    outputs = [(name, path) for name in _FILES if (path := getattr(args, name)) is not None]
-    _check_outputs(args, origin, outputs)
+    _check_outputs(args, origin)
     if args.posterior < 0 or (args.posterior and args.json is None):
         raise errors.UsageError("--posterior needs a positive number of draws, and --json FILE.")
     robot = load_robot(origin)
@@ -120,7 +124,7 @@ def run(args: Identify) -> None:
     if args.report:
         with said_if_slow("Writing the report."):
             io.write_atomically(args.report, write_fit_report(identified, command, args.threads))
-    say(*(f"{_FILES[name]}: {path}" for name, path in outputs))
+    say_written(args.out, args.json, args.report)
     if warning:
         raise errors.PhysicsError(warning)
     say_next(
@@ -140,7 +144,7 @@ def _bounds(text: str) -> tuple[str, tuple[float, float]]:
     return name.strip(), (low, high)
 
 
-def _check_outputs(args: Identify, origin: str, outputs: list[tuple[str, Path]]) -> None:
+def _check_outputs(args: Identify, origin: str) -> None:
     """Refuse an output that would replace an input, before any time is spent."""
     from hopping_leg.identify.recording import sidecar_path
 
@@ -148,11 +152,9 @@ def _check_outputs(args: Identify, origin: str, outputs: list[tuple[str, Path]])
         raise errors.UsageError(f"--out {args.out} must end in .toml, as robot files do.")
     recordings = (*args.recordings, *args.validate)
     inputs = {p.resolve() for p in (Path(origin), *recordings, *map(sidecar_path, recordings))}
-    for name, path in outputs:
+    for path in filter(None, (args.out, args.json, args.report)):
         if path.resolve() in inputs:
-            raise errors.UsageError(f"--{name} {path} would replace an input; give another file.")
-        if path.is_dir():
-            raise errors.UsageError(f"--{name} {path} is a folder; give a file.")
+            raise errors.UsageError(f"{path} is an input; give another file for the result.")
 
 
 def _show(identified: "Identified") -> None:
@@ -165,8 +167,7 @@ def _show(identified: "Identified") -> None:
         known = math.isfinite(row["interval_high"])
         start = f"{row['start']:.4g}"
         rows.append((row["name"], start, value, interval if known else "unknown", row["unit"]))
-    first = Column("parameter", no_wrap=True)
-    show_table((first, "start", "identified", "95 % interval", "unit"), rows)
+    show_table(("parameter", "start", "identified", "95 % interval", "unit"), rows)
     rows = []
     for row in result.quality_json(identified):
         unit, factor = ("mrad", 1e3) if row["unit"] == "rad" else (row["unit"], 1.0)

@@ -101,39 +101,38 @@ def run(
         for robot in robots:
             print(f"{robot.name:<12}  {robot.description}\n{'':<12}  {_summary(robot)}")
         save_json(args.json, [{"name": r.name, **derived(r)} for r in robots])
-    elif isinstance(args, Show):
-        tree = robot_files.load_tree(args.robot)
-        robot, doubted = (
-            robot_files.robot_from_tree(tree, args.robot),
-            robot_files.doubts(args.robot),
-        )
-        rows = [(p, f"{e['value']:g}", e["unit"], e["source"]) for p, e in numbers(tree)]
-        for path, value in derived(robot).items():
-            shown = f"{value:g}" if isinstance(value, float) else value
-            rows.append((path, shown, "", "computed"))
-        title = f"{robot.name}: {robot.description}"
-        show_table(("number", "value", "unit", "source"), rows, title)
-        say(*doubted)
-        facts = {**asdict(robot), "derived": derived(robot), "doubts": doubted}
-        save_json(args.json, facts)
     elif isinstance(args, Import):
         _import(args)
     elif isinstance(args, Draw):
-        from hopping_leg.sim.any_leg import draw_leg
-        from hopping_leg.sim.randomization import draw_twin
-
-        at_least(1, count=args.count)
-        draw = draw_twin if args.kind == "twins" else draw_leg
-        for seed in range(args.seed, args.seed + args.count):
-            drawn = draw(seed)
-            drawn.save(args.out / f"{drawn.robot.name}.toml")
-        print(f"Wrote {args.count} robot files to {args.out}.")
+        _draw(args)
     else:
-        robot = robot_files.robot_from_tree(robot_files.load_tree(args.robot), args.robot)
-        doubted = robot_files.doubts(args.robot)
-        build_model(robot)
-        print(f"{args.robot} is a valid robot: {robot.name} ({_summary(robot)}).")
-        say(*(f"But {doubt}" for doubt in doubted))
+        tree = robot_files.load_tree(args.robot)
+        robot = robot_files.robot_from_tree(tree, args.robot)
+        doubts = robot_files.doubts(args.robot)
+        if isinstance(args, Show):
+            rows = [(p, f"{e['value']:g}", e["unit"], e["source"]) for p, e in numbers(tree)]
+            for path, value in derived(robot).items():
+                shown = f"{value:g}" if isinstance(value, float) else value
+                rows.append((path, shown, "", "computed"))
+            title = f"{robot.name}: {robot.description}"
+            show_table(("number", "value", "unit", "source"), rows, title)
+            save_json(args.json, {**asdict(robot), "derived": derived(robot), "doubts": doubts})
+        else:
+            build_model(robot)
+            print(f"{args.robot} is a valid robot: {robot.name} ({_summary(robot)}).")
+        say(*(f"But {doubt}" for doubt in doubts))
+
+
+def _draw(args: Draw) -> None:
+    from hopping_leg.sim.any_leg import draw_leg
+    from hopping_leg.sim.randomization import draw_twin
+
+    at_least(1, count=args.count)
+    draw = draw_twin if args.kind == "twins" else draw_leg
+    for seed in range(args.seed, args.seed + args.count):
+        drawn = draw(seed)
+        drawn.save(args.out / f"{drawn.robot.name}.toml")
+    print(f"Wrote {args.count} robot files to {args.out}.")
 
 
 def _import(args: Import) -> None:
