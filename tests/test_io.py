@@ -56,7 +56,7 @@ class Outer:
     count: int = 1
     on: bool = False
     pair: tuple[float, float] | None = None
-    kind: str = field(default="a", metadata={"choices": ("a", "b")})
+    kind: Literal["a", "b"] = "a"
 
 
 WHOLE = {"name": "x", "inner": {}}

@@ -159,7 +159,7 @@ def read_dataclass(
     Beyond that, unknown fields are refused, and numbers that are not finite.
 
     Args:
-        kind: The dataclass; a field's ``metadata["choices"]`` are all that it may be.
+        kind: The dataclass.
         tree: The table: field names to values.
         origin: Where it comes from, e.g. the file, for messages.
         error: Raised where something is wrong.
@@ -184,11 +184,10 @@ def _check(
     path: str,
     origin: str,
     error: type[HoppingLegError],
-    choices: tuple[str, ...] = (),
 ) -> None:
     """Refuse unknown fields, values beyond the choices, and numbers that are not finite."""
     subject = f"{origin}: '{path}'"
-    choices = get_args(kind) if get_origin(kind) is Literal else choices
+    choices = get_args(kind) if get_origin(kind) is Literal else ()
     if choices and (not isinstance(value, str | int) or value not in choices):
         named = value if isinstance(value, str) else one_line(value)
         raise error(f"{subject}: {unknown_name('value', named, map(str, choices))}")
@@ -203,8 +202,7 @@ def _check(
                 where = f"field in [{path}]" if path else "field"
                 raise error(f"{origin}: {unknown_name(where, str(key), specs)}")
             at = f"{path}.{key}" if path else key
-            choices = specs[key].metadata.get("choices", ())
-            _check(hints[key], entry, at, origin, error, tuple(choices))
+            _check(hints[key], entry, at, origin, error)
     elif isinstance(value, int | float) and not isinstance(value, bool) and not is_number(value):
         raise error(f"{subject} is {one_line(value)} but must be a finite number.")
 

@@ -173,7 +173,7 @@ def test_a_script_is_read(tmp_path):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ('[[fault]]\nkind = "late"', "There is no value 'late'"),
+        ('[[fault]]\nkind = "late"', "There is no fault kind 'late'"),
         ("[[fault]]\nat = 1.0", "missing required field"),
         ('[[fault]]\nkind = "unplug"\nwhen = 2', "There is no field 'when'"),
         ('[[fault]]\nkind = "unplug"\nat = -1', "must be 0 or more"),

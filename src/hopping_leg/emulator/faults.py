@@ -14,7 +14,7 @@ duration = 0.1
 
 import math
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
@@ -53,7 +53,7 @@ class Fault:
         UsageError: A field has no meaning.
     """
 
-    kind: str = field(metadata={"choices": KINDS})
+    kind: str
     since: str = "powered"
     at: float = 0.0
     """Seconds after ``since``."""
