@@ -13,6 +13,7 @@ import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.torch_layers import create_mlp
 from torch import nn
 
 from hopping_leg import envs
@@ -22,7 +23,6 @@ from hopping_leg.rl.distillation.students import WindowStudent
 from hopping_leg.rl.onnx_export import Actor, DenseActor
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.sb3_env import TaskVecEnv
-from hopping_leg.rl.sb3_policies import dense
 from hopping_leg.robot import Robot
 from hopping_leg.sim import LegSimulator
 
@@ -39,8 +39,8 @@ class _Split(nn.Module):
     def __init__(self, actor: int, inputs: int, hidden: list[int]) -> None:
         super().__init__()
         self._actor = actor
-        self.policy_net = dense(actor, hidden, nn.Tanh)
-        self.value_net = dense(inputs - actor, [256, 128], nn.Tanh)
+        self.policy_net = nn.Sequential(*create_mlp(actor, -1, hidden, nn.Tanh))
+        self.value_net = nn.Sequential(*create_mlp(inputs - actor, -1, [256, 128], nn.Tanh))
         self.latent_dim_pi, self.latent_dim_vf = hidden[-1], 128
 
     def forward(self, seen: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from hopping_leg.envs import HoppingTask
 from hopping_leg.errors import UsageError
-from hopping_leg.rl.model_card import MISSED, missed_commands, stages
+from hopping_leg.rl.model_card import MISSED, missed_commands
 from hopping_leg.rl.recipes import RECIPES, change, changes_of, get_recipe, randomise, words_of
 from hopping_leg.rl.run_folder import RunFolder
 from hopping_leg.robot import load_robot, shipped_robots
@@ -158,12 +158,3 @@ def test_a_card_names_every_command_that_its_own_simulation_misses():
     assert missed_commands(trials(_22=0.0, _25=MISSED, _30=-MISSED)) == ""
     between = [{"command_m": 0.225, "median_error_m": 0.03}]
     assert "0.225 m (+30 mm)" in missed_commands(between), "not rounded to another"
-
-
-def test_a_card_tells_how_the_stages_of_a_distillation_ended():
-    row = {"name": "teacher", "score": "median error", "must_score_m": 0.006, "seconds": 3.0}
-    rows = [{**row, "score_m": 0.0041, "passed": True}, {**row, "score_m": 0.02, "passed": False}]
-    first, second = stages(rows).splitlines()[1:]
-    assert first == "  - teacher: median error 4.1 mm after 3 s, passed (at most 6 mm)"
-    assert "20.0 mm after 3 s, **not passed**" in second
-    assert stages([]) == ""

@@ -23,7 +23,12 @@ def test_a_training_tells_how_its_stages_ended(tmp_path, monkeypatch):
     assert not rows[2]["passed"], "after seconds of training"
     assert rows[3]["score_m"] == result["selected"]["worst_score_m"]
     card = (tmp_path / "model_card.md").read_text()
-    assert all(f"  - {row['name']}: {row['score']}" in card for row in rows)
+    for row in rows:
+        judged = "passed" if row["passed"] else "**not passed**"
+        told = (
+            f"{row['score']} {1000 * row['score_m']:.1f} mm after {row['seconds']:.0f} s, {judged}"
+        )
+        assert f"  - {row['name']}: {told}" in card
 
 
 def test_a_run_is_known_by_what_was_asked_and_its_card_says_what_is_in_reach(tmp_path, monkeypatch):

@@ -21,12 +21,16 @@ def write_card(folder: Path) -> Path:
 
 def render(result: dict[str, Any]) -> str:
     """Return the card of a finished training, as Markdown, from its ``result.json``."""
-    selected, task = result["selected"], result["options"]["task"]
+    selected, task, name = result["selected"], result["options"]["task"], result["robot"]
     commands = task["command_range"] or (min(task["commands"]), max(task["commands"]))
     versions = ", ".join(f"{name} {number}" for name, number in result["versions"].items())
-    name = result["robot"]
     robot = f"`{name}`" if name in shipped_robots() else f"{name}, `{ROBOT_FILE}` in this folder"
-    legs = "any leg of this kind;\nthe trials below are on" if _any(result) else "robot"
+    any_leg = result["options"]["legs"] == "any"
+    legs = "any leg of this kind;\nthe trials below are on" if any_leg else "robot"
+    steps, minutes, tried = selected["steps"], selected["minutes"], len(result["history"])
+    chosen = (
+        f"- Selection: the policy after {steps} steps ({minutes:.1f} min) of {tried} snapshots.\n"
+    )
     return f"""# Policy `{result["recipe"]}`, seed {result["seed"]}
 
 One network from joint measurements to joint torques, for {legs} {robot}
@@ -37,51 +41,49 @@ One network from joint measurements to joint torques, for {legs} {robot}
 
 - Training: {result["steps"]} control steps, {result["minutes"]:.1f} min of wall-clock time, physics
   step {1000 * task["timestep"]:g} ms.
-{stages(result["stages"])}\
-{selection(result)}\
-- Versions: {versions}.
+{_stages(result["stages"])}{chosen if tried > 1 else ""}- Versions: {versions}.
 
 Trials on the selection seeds {", ".join(map(str, selected["seeds"]))}, noise and delay on, physics
 step {1000 * TIMESTEP:g} ms, the first 2 s of each trial dropped. These seeds chose the policy;
 `hop evaluate policy.onnx` judges it on others, in this folder.
 
-{table(selected["trials"])}
-{missed_commands(selected["trials"])}"""
+| command m | median error mm | std mm | hops/s | flight % | skipped | body contact ticks\
+ | lowest base m |
+|---|---|---|---|---|---|---|---|
+{"".join(map(_row, selected["trials"]))}{missed_commands(selected["trials"])}"""
 
 
-def _any(result: dict[str, Any]) -> bool:
-    return bool(result["options"]["legs"] == "any")
-
-
-def stages(rows: list[dict[str, Any]]) -> str:
+def _stages(rows: list[dict[str, Any]]) -> str:
     """Return lines on the stages of a distillation, if it was one."""
-    shown = "\n".join(
+    shown = "".join(
         f"  - {row['name']}: {row['score']} {_mm(row['score_m'])} mm"
         f" after {row['seconds']:.0f} s, {'passed' if row['passed'] else '**not passed**'}"
-        f" (at most {1000 * row['must_score_m']:g} mm)"
+        f" (at most {1000 * row['must_score_m']:g} mm)\n"
         for row in rows
     )
-    return f"- Stages:\n{shown}\n" if rows else ""
+    return f"- Stages:\n{shown}" if rows else ""
 
 
-def selection(result: dict[str, Any]) -> str:
-    """Return lines on how the policy was chosen, if there were several to choose from."""
-    selected = result["selected"]
-    if "finalists" not in selected:
-        return ""
-    return (
-        f"- Selection: the policy after {selected['steps']} steps ({selected['minutes']:.1f} min),"
-        f" the best of\n  {len(selected['finalists'])} finalists out of {len(result['history'])}"
-        " snapshots.\n"
+def _row(trial: dict[str, Any]) -> str:
+    """Return the line of a command's trials in the table."""
+    cells = (
+        _height(trial["command_m"]),
+        _mm(trial["median_error_m"]),
+        _mm(trial["std_m"]),
+        f"{trial['hops_per_s']:.2f}",
+        f"{100 * trial['flight_fraction']:.0f}",
+        f"{trial['skipped_hops']} of {trial['hops'] + trial['skipped_hops']}",
+        str(trial["body_contact_ticks"]),
+        f"{trial['min_height_m']:.3f}",
     )
+    return f"| {' | '.join(cells)} |\n"
 
 
 def missed_commands(trials: list[dict[str, Any]]) -> str:
     """Return a paragraph on the commands that a policy misses in its own simulation, if any."""
-    errors = {t["command_m"]: t["median_error_m"] for t in trials}
     missed = [
         f"{_height(command)} m ({'no hops' if error is None else f'{1000 * error:+.0f} mm'})"
-        for command, error in errors.items()
+        for command, error in ((t["command_m"], t["median_error_m"]) for t in trials)
         if error is None or abs(error) > MISSED
     ]
     if not missed:
@@ -90,22 +92,6 @@ def missed_commands(trials: list[dict[str, Any]]) -> str:
 **Commands missed in its own simulation: {", ".join(missed)}.** Train longer or from another seed
 before this policy goes to any other leg.
 """
-
-
-def table(trials: list[dict[str, Any]]) -> str:
-    """Return trials as a Markdown table."""
-    head = (
-        "| command m | median error mm | std mm | hops/s | flight % | skipped | body contact ticks"
-        " | lowest base m |\n|---|---|---|---|---|---|---|---|"
-    )
-    rows = [
-        f"| {_height(t['command_m'])} | {_mm(t['median_error_m'])} | {_mm(t['std_m'])}"
-        f" | {t['hops_per_s']:.2f} | {100 * t['flight_fraction']:.0f} | {t['skipped_hops']}"
-        f" of {t['hops'] + t['skipped_hops']} | {t['body_contact_ticks']}"
-        f" | {t['min_height_m']:.3f} |"
-        for t in trials
-    ]
-    return "\n".join([head, *rows])
 
 
 def _mm(metres: float | None) -> str:

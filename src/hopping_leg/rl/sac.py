@@ -1,11 +1,21 @@
-"""Soft actor-critic with the hyper-parameters of a recipe."""
+"""Soft actor-critic with the hyper-parameters of a recipe.
+
+Its actor sees what the robot measures; its critics, which are thrown away afterwards, may see the
+true state.
+"""
 
 from dataclasses import dataclass
+from typing import Any
 
+import gymnasium
+import torch
+from stable_baselines3.common.policies import ContinuousCritic
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.sac.policies import Actor, SACPolicy
 from torch import nn
 
 from hopping_leg.envs.task import HoppingTask
-from hopping_leg.rl import resumable, sb3_env, sb3_policies
+from hopping_leg.rl import resumable, sb3_env
 
 
 @dataclass(frozen=True)
@@ -55,7 +65,7 @@ class SACConfig:
         rate = self.learning_rate
         seen = {"actor_size": task.observation.size} if network.privileged_critic else {}
         return resumable.ResumableSAC(
-            sb3_policies.AsymmetricSACPolicy if network.privileged_critic else "MlpPolicy",
+            AsymmetricSACPolicy if network.privileged_critic else "MlpPolicy",
             sb3_env.TaskVecEnv(task, privileged=network.privileged_critic),
             learning_rate=lambda remaining: rate * (0.1 + 0.9 * remaining),
             buffer_size=self.buffer_size,
@@ -78,3 +88,36 @@ class SACConfig:
             seed=seed,
             device="cpu",
         )
+
+
+class _Columns(BaseFeaturesExtractor):  # type: ignore[misc]
+    """Passes on some entries of an observation."""
+
+    def __init__(self, space: gymnasium.spaces.Box, columns: slice) -> None:
+        super().__init__(space, len(range(space.shape[0])[columns]))
+        self._columns = columns
+
+    def forward(self, observation: torch.Tensor) -> torch.Tensor:
+        """Return the entries, (n, features_dim)."""
+        return observation[:, self._columns]
+
+
+class AsymmetricSACPolicy(SACPolicy):  # type: ignore[misc]
+    """SAC policy whose actor sees the first ``actor_size`` entries and whose critics the others.
+
+    ``TaskVecEnv`` with ``privileged`` joins both to one observation.
+    """
+
+    def __init__(self, *args: Any, actor_size: int, **kwargs: Any) -> None:  # noqa: ANN401
+        self._actor_size = actor_size
+        super().__init__(*args, **kwargs)
+
+    def make_actor(self, features_extractor: BaseFeaturesExtractor | None = None) -> Actor:
+        """Build the actor on the measurements."""
+        return super().make_actor(_Columns(self.observation_space, slice(self._actor_size)))
+
+    def make_critic(
+        self, features_extractor: BaseFeaturesExtractor | None = None
+    ) -> ContinuousCritic:
+        """Build a pair of critics on the true state."""
+        return super().make_critic(_Columns(self.observation_space, slice(self._actor_size, None)))

@@ -6,11 +6,11 @@ from typing import Literal
 
 import numpy as np
 import torch
+from stable_baselines3.common.torch_layers import create_mlp
 from torch import nn
 
 from hopping_leg.envs.hidden_state import ERROR_GAIN, MISSED
 from hopping_leg.envs.observation import Observation
-from hopping_leg.rl import sb3_policies
 from hopping_leg.rl.distillation.buffer import Batch, RolloutBuffer
 from hopping_leg.rl.onnx_export import Actor, DenseActor
 
@@ -59,7 +59,8 @@ class WindowStudent(DenseActor, Student):
     """Dense layers on what is measured; what it has to remember must be in there."""
 
     def __init__(self, inputs: int, hidden: list[int]) -> None:
-        super().__init__(*sb3_policies.dense(inputs, hidden, nn.Tanh), nn.Linear(hidden[-1], 2))
+        layers = create_mlp(inputs, -1, hidden, nn.Tanh)
+        super().__init__(nn.Sequential(*layers), nn.Linear(hidden[-1], 2))
 
     def recall(
         self, buffer: RolloutBuffer, count: int, generator: torch.Generator
@@ -90,7 +91,8 @@ class RecurrentStudent(Student):
         self.memory_size, self.every = config.size + 2, config.update_every
         self.correction = config.correction if unseen else 0.0
         self.unit = nn.GRU(inputs, config.size)
-        self.layers = sb3_policies.dense(config.size + inputs, list(config.hidden), nn.Tanh)
+        layers = create_mlp(config.size + inputs, -1, list(config.hidden), nn.Tanh)
+        self.layers = nn.Sequential(*layers)
         self.action = nn.Linear(config.hidden[-1], 2)
         self.guess = nn.Linear(config.hidden[-1], unseen) if unseen else None
         direction = torch.from_numpy(observation.command_direction.astype(np.float32))
