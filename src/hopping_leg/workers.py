@@ -9,7 +9,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from typing import Any, ParamSpec, Protocol, Self, TypeVar
+from typing import Any, ParamSpec, Self, TypeVar
 
 import numpy as np
 
@@ -20,30 +20,6 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 _PATIENCE = 5.0  # how long an address may take to answer, s
-
-
-class Workers(Protocol):
-    """What shares work out."""
-
-    @property
-    def count(self) -> int:
-        """How many tasks run at once."""
-        ...
-
-    def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> list[R]:
-        """Call a function once per tuple of arguments; return what it returns, in their order.
-
-        Raises:
-            HoppingLegError: A task raised it.
-            UsageError: A worker died.
-        """
-        ...
-
-
-def map_rows(workers: Workers, function: Callable[[Array], Array], rows: Array) -> Array:
-    """Return what a function of independent rows (n, k) returns, computed in about equal parts."""
-    parts = np.array_split(rows, min(workers.count, len(rows)))
-    return np.concatenate(workers.map(function, ((part,) for part in parts)))
 
 
 class ProcessWorkers:
@@ -71,7 +47,12 @@ class ProcessWorkers:
         return self._pool.submit(function, *args, **kwargs)
 
     def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> list[R]:
-        """See ``Workers``."""
+        """Call a function once per tuple of arguments; return what it returns, in their order.
+
+        Raises:
+            HoppingLegError: A task raised it.
+            UsageError: A worker died.
+        """
         if self.count == 1:
             return [function(*values) for values in arguments]
         futures = [self.submit(function, *values) for values in arguments]
@@ -133,7 +114,7 @@ class RayWorkers:
         self.count = count or max(1, int(ray.cluster_resources().get("CPU", 1)))
 
     def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> list[R]:
-        """See ``Workers``; a task that dies begins again, and the function is sent once."""
+        """As ``ProcessWorkers`` does; a task that dies begins again, the function is sent once."""
         sent, task = self._ray.put(function), self._ray.remote(_call)
         try:
             return list(self._ray.get([task.remote(sent, *values) for values in arguments]))
@@ -157,3 +138,13 @@ def _knock(address: str | None) -> None:
     host, _, port = (address or "").removeprefix("ray://").rpartition(":")
     if host and port.isdigit():
         socket.create_connection((host, int(port)), _PATIENCE).close()
+
+
+Workers = ProcessWorkers | RayWorkers
+"""What shares work out: ``count`` tasks at once, called by ``map``."""
+
+
+def map_rows(workers: Workers, function: Callable[[Array], Array], rows: Array) -> Array:
+    """Return what a function of independent rows (n, k) returns, computed in about equal parts."""
+    parts = np.array_split(rows, min(workers.count, len(rows)))
+    return np.concatenate(workers.map(function, ((part,) for part in parts)))
