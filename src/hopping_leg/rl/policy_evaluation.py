@@ -5,15 +5,18 @@ The seeds here select; they must never be among those that judge (1000 and above
 
 import itertools
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hopping_leg import io
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.controllers.rollout import Rollout, RolloutConfig, rollout
 from hopping_leg.hop_detection import HopMeasurement, measure_hops
 from hopping_leg.rl.onnx_export import every_centimetre, with_shifts
+from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot.parameters import JOINTS, Robot
 
 FIRST_SEED = 500
@@ -21,6 +24,9 @@ FIRST_SEED = 500
 
 FINAL_SEEDS = (501, 502, 503, 504)
 """Judge the best snapshots once more at the end."""
+
+FINALISTS = 4
+"""Snapshots that are tried once more at the end."""
 
 CALIBRATION_SEEDS = (505, 506, 507, 508)
 """By whose hops a policy's command is corrected."""
@@ -187,3 +193,57 @@ def calibrate(content: bytes, robot: Robot, rounds: int) -> bytes:
         shifts -= errors.clip(-_TRUSTED, _TRUSTED) / number
         shifts = shifts.clip(-_MOST, _MOST)
     return with_shifts(content, shifts)
+
+
+class Selection:
+    """Tries every snapshot on one seed; the best few again on others, and one of those wins.
+
+    Snapshots are kept in ``folder``, named by their steps.
+    """
+
+    def __init__(self, recipe: Recipe, robot: Robot, folder: Path) -> None:
+        self._recipe, self._robot, self._folder = recipe, robot, folder
+        self.rows: list[dict[str, Any]] = []
+        """Every snapshot so far: steps, minutes, score and trials, as JSON values."""
+
+    @property
+    def next_at(self) -> int:
+        """Steps after which the next snapshot is due."""
+        every = self._recipe.selection.eval_every
+        return every * (self.rows[-1]["steps"] // every + 1) if self.rows else every
+
+    def _file(self, steps: int) -> Path:
+        return self._folder / f"{steps:012d}.onnx"
+
+    def add(self, steps: int, minutes: float, content: bytes) -> dict[str, Any]:
+        """Keep and try a policy file; return its row."""
+        io.write_atomically(self._file(steps), content)
+        self.rows.append({"steps": steps, "minutes": minutes, **self.trials(content)})
+        return self.rows[-1]
+
+    def choose(self) -> tuple[bytes, dict[str, Any]]:
+        """Return the best policy file and its row, with the scores of all finalists."""
+        ranked = sorted(self.rows, key=lambda row: float(row["score_m"]))[:FINALISTS]
+        if len(ranked) == 1 and self._recipe.selection.calibrations:  # is tried again in any case
+            best = {**ranked[0], "seeds": list(FINAL_SEEDS)}
+            return self._file(best["steps"]).read_bytes(), best
+        finals = [
+            row | self.trials(self._file(row["steps"]).read_bytes(), FINAL_SEEDS) for row in ranked
+        ]
+        best = min(finals, key=lambda row: float(row["score_m"]))
+        scores = [{"steps": row["steps"], "score_m": row["score_m"]} for row in finals]
+        best |= {"finalists": scores, "seeds": list(FINAL_SEEDS)}
+        return self._file(best["steps"]).read_bytes(), best
+
+    def trials(self, content: bytes, seeds: tuple[int, ...] = (FIRST_SEED,)) -> dict[str, Any]:
+        """Return score, m, and trials of a policy file, as JSON values."""
+        recipe = self._recipe
+        policy = Policy(content, "snapshot", recipe.name)
+        policy.set_robot(self._robot)
+        commands, rate = recipe.selection.eval_commands, recipe.task.rate
+        results = evaluate_policy(policy, self._robot, commands, seeds, rate)
+        return {
+            "score_m": score(results),
+            "worst_score_m": max(map(command_score, results)),
+            "trials": as_rows(results),
+        }

@@ -63,10 +63,6 @@ class RunFolder:
             words += ["--minutes", f"{self.config['minutes_budget']:g}"]
         return shlex.join([*words, *recipes.words_of(self._recipe)])
 
-    def snapshot(self, steps: int) -> Path:
-        """Return the file of the policy as it was after so many steps."""
-        return self.path / "snapshots" / f"{steps:012d}.onnx"
-
     def begin(self, *, resume: bool) -> checkpoint.Tree | None:
         """Prepare the folder; return the newest checkpoint if there is one to resume from.
 

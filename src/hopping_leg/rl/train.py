@@ -14,13 +14,12 @@ from stable_baselines3.common.logger import configure
 from hopping_leg import errors, io, locks
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.envs import TaskLeg
-from hopping_leg.rl import onnx_export, policy_evaluation, reach, run_folder
+from hopping_leg.rl import onnx_export, reach, run_folder
 from hopping_leg.rl.checkpoint import write_checkpoint
 from hopping_leg.rl.distillation.dagger import DaggerConfig
 from hopping_leg.rl.model_card import write_card
-from hopping_leg.rl.policy_evaluation import calibrate
+from hopping_leg.rl.policy_evaluation import FINAL_SEEDS, Selection, calibrate, input_range
 from hopping_leg.rl.recipe import Recipe
-from hopping_leg.rl.selection import Selection
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.terminal import Progress
 
@@ -170,7 +169,7 @@ class Trainer:
         self.learner.on_boundary = self._at_boundary
         if minutes is not None:
             self.learner.remaining = lambda: max(0.0, 1 - self.elapsed / self._seconds)
-        self.selection = Selection(recipe, robot, folder)
+        self.selection = Selection(recipe, robot, folder.path / "snapshots")
         self._stages = stages_of(recipe)
         self.stages: list[dict[str, Any]] = []
         """How the stages of a distillation ended so far, as JSON values."""
@@ -228,16 +227,14 @@ class Trainer:
         self.end_stage(selected["worst_score_m"])
         if recipe.selection.calibrations:
             content = calibrate(content, self.robot, recipe.selection.calibrations)
-            selected |= self.selection.final(content)
+            selected |= self.selection.trials(content, FINAL_SEEDS)
             self.end_stage(selected["worst_score_m"])
         policy = Policy(content, "the selected policy", recipe.name)
         heights, legs = onnx_export.every_centimetre(recipe.task.command_bounds), [self.robot]
         if self.legs:
             legs += [leg.true for leg in self.legs[:_RANGE_LEGS]]
             heights = heights[::_RANGE_STRIDE]
-        ranges = [
-            policy_evaluation.input_range(policy, leg, heights, recipe.task.rate) for leg in legs
-        ]
+        ranges = [input_range(policy, leg, heights, recipe.task.rate) for leg in legs]
         low = tuple(map(min, zip(*(least for least, _ in ranges), strict=True)))
         high = tuple(map(max, zip(*(most for _, most in ranges), strict=True)))
         card = replace(policy.card, input_low=low, input_high=high)

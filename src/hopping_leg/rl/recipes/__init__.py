@@ -4,6 +4,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, get_args, get_type_hints
 
+import msgspec
+
 from hopping_leg.controllers.user_controllers import load_user_object
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.rl.distillation.students import StudentConfig
@@ -32,7 +34,6 @@ own."""
 _TEXTS = {"memory": get_args(get_type_hints(StudentConfig)["memory"])}
 """Options that are one of some words."""
 
-_SWITCH = {"true": True, "1": True, "false": False, "0": False}
 _KINDS = {bool: "true or false", int: "a whole number", float: "a number"}
 
 
@@ -64,11 +65,10 @@ def change(recipe: Recipe, changes: Sequence[str]) -> Recipe:
             raise UsageError(unknown_name(f"value of '{name}'", text, _TEXTS[name]))
         kind = type(known[name])
         try:
-            values[name] = _SWITCH[text.lower()] if kind is bool else kind(text)
-            valid = kind is str or math.isfinite(values[name])
-        except (ValueError, KeyError):
-            valid = False
-        if not valid:
+            values[name] = msgspec.convert(text, kind, strict=False)
+        except msgspec.ValidationError:
+            values[name] = math.nan
+        if kind is not str and not math.isfinite(values[name]):
             raise UsageError(
                 f"'{entry}' does not say {_KINDS[kind]}; give e.g. {name}={known[name]}."
             )
