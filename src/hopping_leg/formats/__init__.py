@@ -29,26 +29,6 @@ from hopping_leg.trace import SCHEMA, Trace
 JOINT_STATE = "sensor_msgs/msg/JointState"
 FLOAT = "std_msgs/msg/Float64"
 
-DEFINITIONS = {
-    JOINT_STATE: """\
-std_msgs/Header header
-string[] name
-float64[] position
-float64[] velocity
-float64[] effort
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-""",
-    FLOAT: "float64 data\n",
-}
-"""Fields of the messages that are written and read, as ROS 2 defines them."""
-
 STATES = "joint_states"
 COMMANDS = "joint_commands"
 QUANTITIES = ("position", "velocity", "effort")
@@ -97,7 +77,9 @@ def to_mcap(trace: Trace) -> bytes:
         TraceError: The trace has no time, or one before 1970.
     """
     from mcap_ros2.writer import Writer
+    from rosbags.typesys import Stores, get_typestore
 
+    definitions = get_typestore(Stores.ROS2_HUMBLE)
     stamps = np.rint(1e9 * trace.column("time_s"))
     if not (np.isfinite(stamps) & (stamps >= 0)).all():
         raise TraceError(
@@ -107,7 +89,10 @@ def to_mcap(trace: Trace) -> bytes:
     with Writer(content) as writer:
         header = json.dumps({"schema": SCHEMA, **trace.header}, sort_keys=True)
         writer.add_metadata(KEY, {"header": header})
-        kinds = {name: writer.register_msgdef(name, text) for name, text in DEFINITIONS.items()}
+        kinds = {
+            name: writer.register_msgdef(name, definitions.generate_msgdef(name, ros_version=2)[0])
+            for name in (JOINT_STATE, FLOAT)
+        }
         numbers = {name: trace.column(name) for name in trace.numbers}
         joints = {topic: _joints(numbers, of) for topic, of in COLUMNS.items()}
         used = {c for columns in COLUMNS.values() for triple in columns.values() for c in triple}
