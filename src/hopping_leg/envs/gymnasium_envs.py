@@ -6,6 +6,7 @@ every array that is handed out is the caller's.
 """
 
 import dataclasses
+import functools
 import math
 from typing import Any
 
@@ -24,47 +25,14 @@ from hopping_leg.envs.task import HoppingTask, Step
 from hopping_leg.envs.task_config import TaskConfig
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, build_model, load_robot
-from hopping_leg.sim import LegSimulator
 
 Image = npt.NDArray[np.uint8]
 
 _LARGEST = float(np.finfo(np.float32).max)
 
 
-class Camera:
-    """Draws one of many legs from the side; takes OpenGL up with its first picture."""
-
-    def __init__(self, legs: LegSimulator) -> None:
-        self.legs = legs
-        self._renderer: Any = None
-        self._model = build_model(legs.robot)
-        self._data = mujoco.MjData(self._model)
-
-    def picture(self, leg: int = 0) -> Image:
-        """Return an RGB picture of a leg, (480, 640, 3); a UsageError where there is no OpenGL."""
-        if self._renderer is None:
-            try:
-                self._renderer = mujoco.Renderer(self._model, height=480, width=640)
-            except Exception as error:  # each OpenGL backend raises its own kind
-                raise UsageError(
-                    f"Pictures need OpenGL, which is not available here ({error}); install a driver"
-                    " and set MUJOCO_GL=egl or MUJOCO_GL=osmesa, or do not render."
-                ) from error
-        self._data.qpos[0], self._data.qpos[1:] = self.legs.height[leg], self.legs.q[leg]
-        mujoco.mj_forward(self._model, self._data)
-        self._renderer.update_scene(self._data, camera="side")
-        image: Image = self._renderer.render()
-        return image
-
-    def close(self) -> None:
-        """Free the OpenGL context."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
-
-
 class _TaskView:
-    """What both environments are: a task, its spaces, its camera, and whether it was seeded."""
+    """What both environments are: a task, its spaces, its pictures, and whether it was seeded."""
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 200}  # noqa: RUF012
     np_random: np.random.Generator
@@ -81,9 +49,34 @@ class _TaskView:
         self.metadata = {**type(self).metadata, "render_fps": round(options.rate)}
         terms, rng = reward or paper_reward(leg), np.random.default_rng(0)
         self.task = HoppingTask(leg, count, options, terms, rng, threads, autoreset=autoreset)
-        self._camera, self._seeded = Camera(self.task.legs), False
+        self._seeded = False
         seen = Box(-_LARGEST, _LARGEST, (self.task.observation.size,), np.float32)
         return seen, Box(-1.0, 1.0, (2,), np.float32)
+
+    @functools.cached_property
+    def _stage(self) -> tuple[mujoco.Renderer, mujoco.MjData]:
+        model = build_model(self.task.robot)
+        try:
+            return mujoco.Renderer(model, height=480, width=640), mujoco.MjData(model)
+        except Exception as error:  # each OpenGL backend raises its own kind
+            raise UsageError(
+                f"Pictures need OpenGL, which is not available here ({error}); install a driver"
+                " and set MUJOCO_GL=egl or MUJOCO_GL=osmesa, or do not render."
+            ) from error
+
+    def _picture(self, leg: int = 0) -> Image:
+        """Return an RGB picture from the side, (480, 640, 3); a UsageError without OpenGL."""
+        (renderer, data), legs = self._stage, self.task.legs
+        data.qpos[0], data.qpos[1:] = legs.height[leg], legs.q[leg]
+        mujoco.mj_forward(renderer.model, data)
+        renderer.update_scene(data, camera="side")
+        image: Image = renderer.render()
+        return image
+
+    def _close_stage(self) -> None:
+        if "_stage" in vars(self):
+            self._stage[0].close()
+            del self._stage
 
     def _begin(self, seed: int | None, command: Array | None) -> Array32:
         again, self._seeded = self._seeded and seed is None, True
@@ -171,11 +164,11 @@ class HoppingEnv(_TaskView, gymnasium.Env[Array32, Array32]):
 
     def render(self) -> Image | None:
         """Return a picture from the side, (480, 640, 3), in mode ``"rgb_array"``."""
-        return None if self.render_mode is None else self._camera.picture()
+        return None if self.render_mode is None else self._picture()
 
     def close(self) -> None:
         """Free the renderer."""
-        self._camera.close()
+        self._close_stage()
 
 
 class HoppingVectorEnv(_TaskView, gymnasium.vector.VectorEnv[Array32, Array32, Any]):
@@ -289,8 +282,8 @@ class HoppingVectorEnv(_TaskView, gymnasium.vector.VectorEnv[Array32, Array32, A
         """Return a picture of every leg from the side in mode ``"rgb_array"``."""
         if self.render_mode is None:
             return None
-        return tuple(self._camera.picture(leg).copy() for leg in range(self.num_envs))
+        return tuple(self._picture(leg).copy() for leg in range(self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:  # noqa: ANN401
         """Free the renderer."""
-        self._camera.close()
+        self._close_stage()

@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from hopping_leg import envs, io
 from hopping_leg.rl.distillation.dagger import Dagger, DaggerConfig
 from hopping_leg.rl.distillation.students import StudentConfig
-from hopping_leg.rl.learner import Learner
+from hopping_leg.rl.resumable import ResumableSAC
 from hopping_leg.rl.sac import NetworkConfig, SACConfig
 from hopping_leg.robot import DEFAULT_ROBOT, Robot
 
@@ -107,14 +108,11 @@ class Recipe:
 
     def value(self, name: str) -> Any:  # noqa: ANN401
         """Return an option by its name in ``paths``."""
-        found: Any = self
-        for part in dict(self.paths())[name].split("."):
-            found = getattr(found, part)
-        return found
+        return attrgetter(dict(self.paths())[name])(self)
 
     def make_learner(
         self, robot: Robot, seed: int, threads: int = 1, legs: Sequence[envs.TaskLeg] = ()
-    ) -> Learner:
+    ) -> Dagger | ResumableSAC:
         """Build the algorithm on its environments, of ``legs`` where these differ, untrained."""
         rng, count, options = np.random.default_rng(seed), self.schedule.num_envs, self.task
         if isinstance(self.algorithm, DaggerConfig):

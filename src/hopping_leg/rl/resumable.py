@@ -17,8 +17,8 @@ from stable_baselines3 import SAC
 
 from hopping_leg.envs.observation import Observation
 from hopping_leg.rl.checkpoint import Tree, to_numpy, to_torch
-from hopping_leg.rl.learner import RecentHops
 from hopping_leg.rl.onnx_export import Actor, DenseActor
+from hopping_leg.rl.recent_hops import RecentHops
 from hopping_leg.rl.sb3_env import TaskVecEnv
 
 _COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_current_progress_remaining")
@@ -26,7 +26,7 @@ _REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "
 
 
 class ResumableSAC(SAC):  # type: ignore[misc]
-    """Soft actor-critic on a ``TaskVecEnv``, a ``Learner``."""
+    """Soft actor-critic on a ``TaskVecEnv``; ``Dagger`` has the same attributes."""
 
     on_boundary: Callable[[], None] | None = None
     remaining: Callable[[], float] | None = None

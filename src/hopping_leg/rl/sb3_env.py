@@ -9,7 +9,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from hopping_leg.arrays import Array, Array32, BoolArray
 from hopping_leg.envs.task import HoppingTask, Step
-from hopping_leg.rl.learner import RecentHops
+from hopping_leg.rl.recent_hops import RecentHops
 
 
 class TaskVecEnv(VecEnv):  # type: ignore[misc]

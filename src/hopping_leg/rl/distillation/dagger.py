@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import torch
@@ -27,9 +27,8 @@ from hopping_leg.envs.task import HoppingTask, Step
 from hopping_leg.rl.checkpoint import Tree, to_numpy, to_torch
 from hopping_leg.rl.distillation.buffer import LabelledRollout, RolloutBuffer
 from hopping_leg.rl.distillation.students import Student, StudentConfig
-from hopping_leg.rl.learner import RecentHops
+from hopping_leg.rl.recent_hops import RecentHops
 from hopping_leg.robot import GRAVITY
-from hopping_leg.sim import LegSimulator
 
 _PUSHED, _PUSHES = 0.15, 0.5
 """Share of the environments that push the base, and how often these do, 1/s."""
@@ -42,40 +41,6 @@ _HELD_STIFFNESS, _HELD_DAMPING = 2.0, 0.05
 def cosine(left: float) -> float:
     """Fall from 1 to 0.02 as the share of the budget that is left falls from 1 to 0."""
     return 0.02 + 0.98 * (1 + math.cos(math.pi * (1 - left))) / 2
-
-
-class Teacher(Protocol):
-    """Says what to do in the true state of simulated legs."""
-
-    def watch(self, legs: LegSimulator) -> None:
-        """Take the legs, live."""
-        ...
-
-    def reset(self, count: int) -> None:
-        """Forget everything; there are ``count`` legs."""
-        ...
-
-    def torque(self, command: Array) -> Array:
-        """Return joint torques for desired apexes, m, (n,), N m, (n, 2)."""
-        ...
-
-    @property
-    def pushing(self) -> BoolArray:
-        """Which legs push, (n,)."""
-        ...
-
-    @property
-    def folding(self) -> BoolArray:
-        """Which legs have to fold on the ground, (n,): they stand, or have pushed off."""
-        ...
-
-    def state(self) -> dict[str, Array]:
-        """Return what is remembered from tick to tick."""
-        ...
-
-    def restore(self, state: dict[str, Array]) -> None:
-        """Go on from a ``state``."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -114,18 +79,18 @@ class DaggerConfig:
     planning: Planning = field(default_factory=Planning)
     """How the teacher simulates hops."""
 
-    def make_teacher(self, task: HoppingTask) -> Teacher:
+    def make_teacher(self, task: HoppingTask) -> TrueStateMpc:
         """Build the teacher."""
         return TrueStateMpc(task.robot, self.teacher, self.planning, rate=task.options.rate)
 
 
 class Dagger:
-    """A distillation, a ``Learner``.
+    """A distillation, with the names of stable-baselines3.
 
     Everything random follows from the seed, on any number of cores.
 
     Attributes:
-        on_boundary: Called before every rollout.
+        on_boundary: Called before every rollout: a state taken there continues exactly.
         remaining: Returns the share of the budget that is left, 1 to 0; the schedules follow this
             or the share of steps left, whichever is smaller.
     """
