@@ -124,14 +124,6 @@ def test_where_no_cluster_answers_there_is_a_sentence_at_once(address):
         RayWorkers(address)
 
 
-def test_a_cluster_of_ones_own_reports_to_nobody(monkeypatch):
-    usage = pytest.importorskip("ray._common.usage.usage_lib", reason=NONE)
-    monkeypatch.setattr(os, "environ", {k: v for k, v in os.environ.items() if "USAGE" not in k})
-    with pytest.raises(UsageError):
-        RayWorkers("127.0.0.1:1")
-    assert not usage.usage_stats_enabled()
-
-
 def test_without_ray_there_is_a_sentence(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(UsageError, match=r"hopping-leg\[cluster\]"):

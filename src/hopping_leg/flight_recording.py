@@ -165,3 +165,8 @@ def recover(path: Path) -> trace.Trace:
         pl.lit(float("nan")).alias(name) for name in missing
     )
     return trace.Trace(table, {**box.header, "events": box.events})
+
+
+def load_trace(path: Path) -> trace.Trace:
+    """Return a stored trace, or that of a flight recording."""
+    return recover(path) if path.suffix == SUFFIX else trace.Trace.load(path)

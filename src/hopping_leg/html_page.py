@@ -48,24 +48,21 @@ class Column:
     bad: Callable[[Any], bool] = lambda _row: False
 
 
+_TABLE = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from_string("""\
+<div class="wide"><table><caption>{{ caption }}</caption>
+<tr>{% for c in columns %}<th>{{ unbroken(c.heading) }}</th>{% endfor %}</tr>
+{% for row in rows %}
+<tr class="{{ 'first' if loop.changed(columns[0].text(row)) }}">
+{% for c in columns %}<td class="{{ 'bad' if c.bad(row) }}">{{ c.text(row) }}</td>{% endfor %}
+</tr>
+{% endfor %}
+</table></div>""")
+
+
 def table(columns: Sequence[Column], rows: Sequence[Any], caption: str = "") -> Markup:
     """Return an HTML table; a line sets off where the first column changes."""
-    if not rows:
-        return Markup("")
-    head = Markup("").join(Markup("<th>{}</th>").format(_unbroken(c.heading)) for c in columns)
-    lines, before = [], ""
-    for row in rows:
-        cells = Markup("").join(
-            Markup('<td class="{}">{}</td>').format("bad" if c.bad(row) else "", c.text(row))
-            for c in columns
-        )
-        first = columns[0].text(row)
-        begins = "first" if first != before else ""
-        lines.append(Markup('<tr class="{}">{}</tr>').format(begins, cells))
-        before = first
-    return Markup(
-        '<div class="wide"><table><caption>{}</caption><tr>{}</tr>{}</table></div>'
-    ).format(caption, head, Markup("").join(lines))
+    shown = {"columns": columns, "rows": rows, "caption": caption, "unbroken": _unbroken}
+    return Markup(_TABLE.render(shown) if rows else "")
 
 
 def _unbroken(heading: str) -> str:

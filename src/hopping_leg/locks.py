@@ -78,6 +78,5 @@ def _holders(terminal: int) -> Iterator[str]:
             opened = {str(entry.readlink()) for entry in (process / "fd").iterdir()}
             own = process.name == str(os.getpid())
             if sought in opened and not own and not opened.intersection(_MASTERS):
-                words = (process / "cmdline").read_bytes().replace(b"\0", b" ")
-                text = words.decode(errors="replace").strip()
-                yield f"process {process.name} ({text[:80]})"
+                words = (process / "cmdline").read_bytes().decode(errors="replace")
+                yield f"process {process.name} ({words.replace(chr(0), ' ').strip()[:80]})"

@@ -14,10 +14,9 @@ import tyro
 
 from hopping_leg.cli.options import JsonFile, RobotFile, save_json, say_written, show_table
 from hopping_leg.errors import UsageError
-from hopping_leg.flight_recording import SUFFIX, recover
+from hopping_leg.flight_recording import load_trace
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import load_robot, to_urdf
-from hopping_leg.trace import Trace
 
 
 @dataclass(frozen=True)
@@ -70,9 +69,8 @@ def _export(args: Traces) -> None:
     from hopping_leg.formats import to_mcap
 
     for path in args.traces:
-        trace = recover(path) if path.suffix == SUFFIX else Trace.load(path)
         file = (args.out or path.parent) / f"{path.stem}.mcap"
-        write_atomically(file, to_mcap(trace))
+        write_atomically(file, to_mcap(load_trace(path)))
         say_written(file)
 
 

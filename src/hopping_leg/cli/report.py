@@ -22,7 +22,7 @@ class Report:
 
     traces: tyro.conf.Positional[tuple[Path, ...]]
     """Parquet files from `hop evaluate --traces DIR` or `hop deploy`; also the .blackbox that a
-    killed `hop deploy` leaves, whose trace is then written beside it."""
+    killed `hop deploy` leaves."""
     out: Path = Path("figures")
     """Folder for the figures."""
     format: Literal["svg", "pdf", "png"] = "svg"
@@ -31,31 +31,17 @@ class Report:
 
 def run(args: Report) -> None:
     """Draw figures."""
-    with said_if_slow("Reading and drawing."):
-        _draw(args)
-
-
-def _draw(args: Report) -> None:
-    from hopping_leg.evaluate import report, result, trials
-    from hopping_leg.figures import encode
-
     if not args.traces:
         raise errors.UsageError(
             "No trace was named; record some with `hop evaluate ... --traces DIR`."
         )
-    runs = [trials.load_run(_trace(path)) for path in args.traces]
-    controllers = list(dict.fromkeys(run.controller for run in runs))
-    for picture in report.draw_report_figures(result.tabulate(runs, controllers, seed=0), runs):
-        path = args.out / f"{picture.name}.{args.format}"
-        io.write_atomically(path, encode(picture.figure, args.format))
-        say(f"{picture.title}: {path}")
+    with said_if_slow("Reading and drawing."):
+        from hopping_leg.evaluate import report, result, trials
+        from hopping_leg.figures import encode
 
-
-def _trace(path: Path) -> Path:
-    from hopping_leg.flight_recording import SUFFIX, recover
-
-    if path.suffix != SUFFIX:
-        return path
-    trace = path.with_suffix(".parquet")
-    recover(path).save(trace)
-    return trace
+        runs = [trials.load_run(path) for path in args.traces]
+        controllers = list(dict.fromkeys(run.controller for run in runs))
+        for picture in report.draw_report_figures(result.tabulate(runs, controllers, seed=0), runs):
+            path = args.out / f"{picture.name}.{args.format}"
+            io.write_atomically(path, encode(picture.figure, args.format))
+            say(f"{picture.title}: {path}")

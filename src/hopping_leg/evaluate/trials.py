@@ -10,6 +10,7 @@ from hopping_leg import errors, io
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.evaluate.metrics import stretches
+from hopping_leg.flight_recording import load_trace
 from hopping_leg.robot import GroundMismatch, Robot, command_limits
 from hopping_leg.robot.parameters import Contact
 from hopping_leg.trace import Trace
@@ -161,7 +162,7 @@ def save_traces(runs: Sequence[Run], directory: Path) -> list[Path]:
 
 def load_run(path: Path) -> Run:
     """Load a trace as a run; traces from elsewhere count as fixed trials of their own."""
-    trace = Trace.load(path)
+    trace = load_trace(path)
     command, time = trace.column("command_m"), trace.column("time_s")
     period = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     steps = tuple((float(command[a]), (b - a) * period) for a, b in stretches(command))
