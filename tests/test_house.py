@@ -21,7 +21,7 @@ CEILINGS = {
     "src/hopping_leg/sim/**/*.py": (12, 2430),
     "src/hopping_leg/viewer/**/*.py": (6, 1220),
     "src/**/*.py": (182, 29280),
-    "tests/**/*.py": (141, 15990),
+    "tests/**/*.py": (141, 15970),
     "studies/**/*.py": (79, 8190),
     "docs/**/*.md": (22, 2500),
     "docs/live/*.js": (13, 1490),

@@ -65,21 +65,17 @@ def test_prediction_is_the_ballistic_apex(reward):
     assert term(reward, "predicted", 0.2, rate, clearance=0.0) == 0.0
 
 
-def test_energy_gain_fades(reward):
+def test_energy_gain_fades_and_can_end_where_the_hop_would_be_too_high(reward):
     moving, still = transition(0.2, 1.0, clearance=0.0), transition(0.2, 0.0, clearance=0.0)
     (early,), (rest,) = reward(moving)[0], reward(still)[0]
     assert early - rest == pytest.approx(CONFIG.scale * CONFIG.energy)
     reward.anneal(0.5)
     assert reward(moving)[0] == reward(still)[0] == pytest.approx(rest)
-
-
-def test_the_energy_gain_can_end_where_the_hop_would_be_too_high():
     bounded, free = make(ApexRewardConfig(energy_beyond=0.03)), make()
-
-    def gains(command):
-        return [term(r, "energy", 0.25, 1.5, command=command) for r in (bounded, free)]
-
-    low, high = gains(0.22), gains(0.40)
+    low, high = (
+        [term(r, "energy", 0.25, 1.5, command=command) for r in (bounded, free)]
+        for command in (0.22, 0.40)
+    )
     assert low[0] < 0.05 * low[1]
     assert high[0] == high[1] == low[1]
 

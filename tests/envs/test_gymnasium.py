@@ -69,21 +69,15 @@ def legs(env):
 @pytest.mark.parametrize("kind", KINDS)
 def test_everything_random_follows_the_seed(kind):
     env = make(kind)
-    first, other, again = (play(env, seed) for seed in (3, 4, 3))
-    assert first == again == play(make(kind), 3)
-    assert first != other
-    assert play(env) != play(env)
-    env.close()
-
-
-@pytest.mark.parametrize("kind", [SINGLE, VECTOR, SYNC])
-def test_what_differs_from_leg_to_leg_follows_the_seed(kind):
-    env, drawn = make(kind), []
+    told, drawn = [], []
     for seed in (3, 4, None, 3):
-        env.reset(seed=seed)
-        drawn.append(legs(env))
-    assert drawn[0] != drawn[1] == drawn[2]
-    assert drawn[0] == drawn[3]
+        told.append(play(env, seed))
+        drawn.append(None if kind == "async" else legs(env))
+    assert told[0] == told[3] == play(make(kind), 3)
+    assert told[0] != told[1] != told[2]
+    assert drawn[1:] == [drawn[1], drawn[1], drawn[0]], "what legs are changes with a seed alone"
+    assert kind == "async" or drawn[0] != drawn[1]
+    env.close()
 
 
 @pytest.mark.parametrize("kind", [VECTOR, SYNC])
@@ -233,26 +227,16 @@ def test_an_episode_has_at_most_the_steps_that_gymnasium_is_told(kind, most, tic
     assert np.flatnonzero(ended).tolist() == [ticks - 1]
 
 
-@pytest.mark.parametrize(
-    "wrap",
-    [
-        wrappers.NormalizeObservation,
-        wrappers.FlattenObservation,
-        wrappers.NormalizeReward,
-        wrappers.RecordEpisodeStatistics,
-        wrappers.ClipAction,
-        wrappers.DictInfoToList,
-    ],
-)
-def test_gymnasiums_vector_wrappers_fit(wrap):
-    env = wrap(make(VECTOR))
+def test_gymnasiums_vector_wrappers_fit():
+    env = wrappers.RecordEpisodeStatistics(wrappers.NormalizeObservation(make(VECTOR)))
+    env = wrappers.DictInfoToList(env)
     env.reset(seed=0)
+    lengths = set()
     for action in plan(env):
-        seen, reward, *_, info = env.step(action)
+        seen, _, _, _, infos = env.step(action)
         assert np.isfinite(seen).all()
-        assert np.isfinite(reward).all()
-        if "episode" in info:
-            assert set(info["episode"]["l"][info["_episode"]]) == {20}
+        lengths |= {info["episode"]["l"] for info in infos if "episode" in info}
+    assert lengths == {20}
 
 
 @pytest.mark.filterwarnings("error")
