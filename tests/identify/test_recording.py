@@ -83,6 +83,7 @@ def test_every_form_of_a_table_reads_the_same(tmp_path, mark, comment):
         (b"0,1\n1,2\n", "has no header"),
         (b"a,a\n1,2\n", "equal names"),
         (b"a,b\n1,2,3\n", "no whole table"),
+        (b"a,b\n1,2\n\n3\n", "row 1 has fewer fields than the 2 of the header"),
         (gzip.compress(b"a,b\n1,2\n", mtime=0)[:-6], "no whole table"),
         (b"time_s,hip_position_rad\ns,0\n", "column 'time_s' must hold Float64.*\"s\""),
     ],
@@ -102,6 +103,15 @@ def test_a_rigs_own_log_is_known_by_either_name_of_its_clock(tmp_path, clock):
     assert load_recording(path).metadata.robot == "doublependulum"
     with pytest.raises(RecordingError, match=r"design C\.0.*another robot.*sidecar"):
         load_recording(other)
+
+
+def test_a_packed_file_is_read_up_to_a_size(tmp_path, monkeypatch):
+    monkeypatch.setattr("hopping_leg.identify.recording._MOST_TEXT", 1000)
+    path = write_run(tmp_path, swinging())
+    packed = tmp_path / "run.csv.gz"
+    packed.write_bytes(gzip.compress(path.read_bytes()))
+    with pytest.raises(RecordingError, match="more than 0 MiB"):
+        load_recording(packed)
 
 
 def test_a_sidecar_may_name_the_columns(tmp_path):

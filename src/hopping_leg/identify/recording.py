@@ -6,6 +6,7 @@ need a sidecar, or come from one of the known rigs.
 
 import gzip
 import hashlib
+import io
 import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -25,6 +26,7 @@ from hopping_leg.io import parse_toml, read_dataclass
 from hopping_leg.trace import Trace, read_parquet
 
 _KEY, _PARQUET, _GZIP = "recording", b"PAR1", b"\x1f\x8b"
+_MOST_TEXT = 1 << 28  # of a packed file, bytes
 _BAGS = (".mcap", ".db3")
 _UNREADABLE = (pl.exceptions.PolarsError, pl.exceptions.PanicException)
 
@@ -187,9 +189,23 @@ def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
     """
     try:
         if content.startswith(_GZIP):
-            content = gzip.decompress(content)
-        header = next((n for n in content.splitlines() if n.strip() and n[:1] != b"#"), b"")
+            with gzip.open(io.BytesIO(content)) as file:
+                content = file.read(_MOST_TEXT + 1)
+            if len(content) > _MOST_TEXT:
+                raise RecordingError(
+                    f"{origin} holds more than {_MOST_TEXT >> 20} MiB of text; split it, or write"
+                    " Parquet."
+                )
+        lines = (n for n in content.splitlines() if n.strip() and n[:1] != b"#")
+        header = next(lines, b"")
         mark = next((m for m in "\t;" if m.encode() in header), ",")
+        fields = header.count(mark.encode())
+        short = next((k for k, n in enumerate(lines) if n.count(mark.encode()) < fields), None)
+        if short is not None and b'"' not in content:
+            raise RecordingError(
+                f"{origin}: row {short} has fewer fields than the {fields + 1} of the header; a"
+                " logger that was killed leaves such a row: delete it."
+            )
         texts = pl.read_csv(content, separator=mark, comment_prefix="#", infer_schema=False)
     except (OSError, EOFError, zlib.error, *_UNREADABLE) as error:
         raise RecordingError(
