@@ -59,8 +59,7 @@ class WindowStudent(DenseActor, Student):
     """Dense layers on what is measured; what it has to remember must be in there."""
 
     def __init__(self, inputs: int, hidden: list[int]) -> None:
-        layers = create_mlp(inputs, -1, hidden, nn.Tanh)
-        super().__init__(nn.Sequential(*layers), nn.Linear(hidden[-1], 2))
+        super().__init__(*create_mlp(inputs, 2, hidden, nn.Tanh))
 
     def recall(
         self, buffer: RolloutBuffer, count: int, generator: torch.Generator
