@@ -11,7 +11,7 @@ from typing import Literal
 
 import tyro
 
-from hopping_leg import errors, io
+from hopping_leg import errors, flight_recording, io
 from hopping_leg.cli.options import say
 from hopping_leg.terminal import said_if_slow
 
@@ -22,7 +22,7 @@ class Report:
 
     traces: tyro.conf.Positional[tuple[Path, ...]]
     """Parquet files from `hop evaluate --traces DIR` or `hop deploy`; also the .blackbox that a
-    killed `hop deploy` leaves."""
+    killed `hop deploy` leaves, whose trace is then written beside it."""
     out: Path = Path("figures")
     """Folder for the figures."""
     format: Literal["svg", "pdf", "png"] = "svg"
@@ -35,6 +35,9 @@ def run(args: Report) -> None:
         raise errors.UsageError(
             "No trace was named; record some with `hop evaluate ... --traces DIR`."
         )
+    for path in args.traces:
+        if path.suffix == flight_recording.SUFFIX:
+            flight_recording.recover(path).save(path.with_suffix(".parquet"))
     with said_if_slow("Reading and drawing."):
         from hopping_leg.evaluate import report, result, trials
         from hopping_leg.figures import encode
