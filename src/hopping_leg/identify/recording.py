@@ -201,7 +201,7 @@ def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
         mark = next((m for m in "\t;" if m.encode() in header), ",")
         fields = header.count(mark.encode())
         short = next((k for k, n in enumerate(lines) if n.count(mark.encode()) < fields), None)
-        if short is not None and b'"' not in content:
+        if short is not None:
             raise RecordingError(
                 f"{origin}: row {short} has fewer fields than the {fields + 1} of the header; a"
                 " logger that was killed leaves such a row: delete it."
