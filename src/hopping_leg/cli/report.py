@@ -11,7 +11,7 @@ from typing import Literal
 
 import tyro
 
-from hopping_leg import errors, flight_recording, io
+from hopping_leg import errors, io
 from hopping_leg.cli.options import say
 from hopping_leg.terminal import said_if_slow
 
@@ -35,13 +35,14 @@ def run(args: Report) -> None:
         raise errors.UsageError(
             "No trace was named; record some with `hop evaluate ... --traces DIR`."
         )
-    for path in args.traces:
-        if path.suffix == flight_recording.SUFFIX:
-            flight_recording.recover(path).save(path.with_suffix(".parquet"))
     with said_if_slow("Reading and drawing."):
+        from hopping_leg import flight_recording
         from hopping_leg.evaluate import report, result, trials
         from hopping_leg.figures import encode
 
+        for path in args.traces:
+            if path.suffix == flight_recording.SUFFIX:
+                flight_recording.recover(path).save(path.with_suffix(".parquet"))
         runs = [trials.load_run(path) for path in args.traces]
         controllers = list(dict.fromkeys(run.controller for run in runs))
         for picture in report.draw_report_figures(result.tabulate(runs, controllers, seed=0), runs):
