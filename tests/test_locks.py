@@ -37,8 +37,11 @@ def test_a_terminal_that_any_other_program_has_open_is_refused_with_its_name(tmp
     path = tmp_path / "link"
     path.symlink_to(os.ttyname(slave))
     DeviceLock(path, UsageError).close()
-    with subprocess.Popen(["sleep", "600"], stdin=slave) as other:
-        with pytest.raises(UsageError, match=rf"in use by process {other.pid} \(sleep 600\)"):
+    waits = ["sh", "-c", "echo; read _"]
+    with subprocess.Popen(waits, stdin=slave, stdout=subprocess.PIPE) as other:
+        other.stdout.readline()  # its name is known once it runs, not once it is started
+        who = rf"in use by process {other.pid} \(sh -c echo; read _\)"
+        with pytest.raises(UsageError, match=who):
             DeviceLock(path, UsageError)
         other.kill()
     DeviceLock(path, UsageError).close()

@@ -78,5 +78,6 @@ def _holders(terminal: int) -> Iterator[str]:
             opened = {str(entry.readlink()) for entry in (process / "fd").iterdir()}
             own = process.name == str(os.getpid())
             if sought in opened and not own and not opened.intersection(_MASTERS):
-                words = (process / "cmdline").read_bytes().decode(errors="replace")
-                yield f"process {process.name} ({words.replace(chr(0), ' ').strip()[:80]})"
+                words = (process / "cmdline").read_bytes() or (process / "comm").read_bytes()
+                name = words.decode(errors="replace").replace("\0", " ").strip()
+                yield f"process {process.name} ({name[:80]})"

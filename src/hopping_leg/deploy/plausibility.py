@@ -80,7 +80,7 @@ class JointEvidence:
     Attributes:
         replies: How many there were.
         still: Of them in a row at rest to the last bit, until now, while the drive was powered.
-        stillest: Most of them in a row that were so before.
+        stillest: Most in a row that were so before; of a drive without power, all together.
         speed_before: Speed before them, rad/s.
         torques: Lowest and highest torque that was told meanwhile, N m.
         contradictions: Times in a row that a moving joint's position and velocity differed.
@@ -89,6 +89,7 @@ class JointEvidence:
         told: Torques that were told one and two ticks before, N m.
         given: Torque of the reply, over the limit.
         swing: Change of velocity with the reply, rad/s.
+        shaken: Largest change of velocity lately, rad/s, halved from reply to reply.
     """
 
     replies: int = 0
@@ -102,6 +103,7 @@ class JointEvidence:
     told: Pair = (0.0, 0.0)
     given: float = 0.0
     swing: float = 0.0
+    shaken: float = 0.0
 
     def after(
         self, motor: MotorLine, last: Reply | None, reply: Reply, told: float
@@ -143,7 +145,7 @@ class JointEvidence:
             older = _summed(self.older, fading, weight * (second + third) / 2, mean)
         return JointEvidence(
             self.replies + 1, still, stillest, before, torques, contradictions, newer, older,
-            (told, self.told[0]), given, swing,
+            (told, self.told[0]), given, swing, max(abs(swing), self.shaken / 2),
         )  # fmt: skip
 
     def dead(self, motor: MotorLine) -> str:

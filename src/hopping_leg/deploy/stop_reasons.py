@@ -57,6 +57,7 @@ class Reason(IntEnum):
 
 
 _DRIFT_SECONDS = 1.0  # Time after which a drift is forgotten
+_DRIFT_SPEED = 2.0  # rad/s; what is faster counts as that while a joint is shaken
 _GAP = 1.5  # Periods between two replies beyond which velocities no longer tell the way between
 _IMPACT = 3.0  # Change of speed between two replies beyond which they do not, rad/s
 
@@ -177,10 +178,14 @@ class Counts:
         last, drift = self.last[index], self.drift[index]
         if reply is None or last is None or abs(reply.velocity - last.velocity) > _IMPACT:
             return drift
-        if not 0 < reply.taken - last.taken < _GAP * limits.period:
+        elapsed = reply.taken - last.taken
+        if not 0 < elapsed < _GAP * limits.period:
             return drift
-        fading = math.exp(-(reply.taken - last.taken) / _DRIFT_SECONDS)
-        return drift * fading + _unexplained(last, reply)
+        unexplained = _unexplained(last, reply)
+        if self.evidence[index].shaken > _IMPACT:
+            most = _DRIFT_SPEED * elapsed
+            unexplained = max(-most, min(most, unexplained))
+        return drift * math.exp(-elapsed / _DRIFT_SECONDS) + unexplained
 
     def _of_drive(
         self, index: int, limits: SafetyLimits, reply: Reply | None

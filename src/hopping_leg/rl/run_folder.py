@@ -67,16 +67,15 @@ class RunFolder:
         """Prepare the folder; return the newest checkpoint if there is one to resume from.
 
         Raises:
-            UsageError: The folder holds a run and ``resume`` is off, or another or finished run.
+            UsageError: The folder holds a run and ``resume`` is off, another or finished run,
+                or checkpoints of an older version alone.
         """
         new = is_new(self.path, resume=resume)
-        found = [] if new else checkpoint.list_checkpoints(self.checkpoints)
         if not new:
             self.check_same()
             if self.policy.exists():
-                raise UsageError(
-                    f"The run in {self.path} is finished; its policy is {self.policy}."
-                )
+                raise UsageError(f"The run in {self.path} is finished; it made {self.policy}.")
+        found = checkpoint.list_checkpoints(self.checkpoints)
         tree = checkpoint.read_checkpoint(found[-1]) if found else self._from_source()
         if new:
             self.write("config.json", self.config)
@@ -123,9 +122,7 @@ def is_new(folder: Path, *, resume: bool) -> bool:
             raise UsageError(f"{folder} is not empty and holds no run; give another --out.")
         return True
     if not resume:
-        raise UsageError(
-            f"{folder} already holds a run; go on with --resume or give another --out."
-        )
+        raise UsageError(f"{folder} already holds a run; give --resume or another --out.")
     return False
 
 
