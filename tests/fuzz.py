@@ -159,11 +159,11 @@ def _robots(make=False):
 def _descriptions(form):
     from hopping_leg.robot import build_model, get_spec, load_robot, to_urdf
     from hopping_leg.robot.importing import imported_robot
-    from hopping_leg.robot.planar_leg import Names, read_leg
+    from hopping_leg.robot.planar_leg import read_leg
     from hopping_leg.robot.robot_files import robot_from_tree
 
     def read(path):
-        made = imported_robot(read_leg(path, Names()), path.name, ("qdd100",))
+        made = imported_robot(read_leg(path), path.name, ("qdd100",))
         build_model(robot_from_tree(made.tree, path.name))
 
     leg = load_robot("legv2")

@@ -21,7 +21,7 @@ from hopping_leg.cli.options import at_least, save_json, say, say_next, show_tab
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import Robot, build_model, importing, numbers, robot_files
-from hopping_leg.robot.planar_leg import Names, read_leg
+from hopping_leg.robot.planar_leg import read_leg
 
 Target = tyro.conf.Positional[str]
 
@@ -141,7 +141,7 @@ def _import(args: Import) -> None:
     if out.exists():
         raise UsageError(f"{out} exists and is not replaced; remove it, or give another --out.")
     values = importing.read_values(args.set)
-    leg = read_leg(args.description, Names(args.hip, args.knee, args.foot))
+    leg = read_leg(args.description, args.hip, args.knee, args.foot)
     made = importing.imported_robot(leg, str(args.description), args.motor, values)
     robot = robot_files.robot_from_tree(made.tree, str(out))
     build_model(robot)

@@ -106,13 +106,11 @@ def imported_robot(
     for joint in JOINTS:
         entries |= _motor_limits(joint, entries)
     entries |= given
-    units, assumed, missing = _units(), dict[str, str](), list[str]()
-    for path in (path for path in units if path not in entries):
-        if (assumption := _assumption(path, entries)) is not None:
-            value, assumed[path] = assumption
-            entries[path] = value, f"assumed: {assumed[path]}"
-        elif not path.startswith("hardware.") and not path.endswith(".armature"):
-            missing.append(f"{path} ({units[path]})")
+    units, assumptions = _units(), _assumptions(entries)
+    assumed = {p: assumptions[p][1] for p in units if p not in entries and p in assumptions}
+    entries |= {path: (assumptions[path][0], f"assumed: {why}") for path, why in assumed.items()}
+    unknown = (path for path in units if path not in entries and not path.startswith("hardware."))
+    missing = [f"{path} ({units[path]})" for path in unknown if not path.endswith(".armature")]
     if missing:
         raise RobotError(
             f"{origin} does not say {', '.join(missing)}; name the motor, --motor"
@@ -124,14 +122,12 @@ def imported_robot(
         value, source = entries[path]
         entry = {"value": float(f"{value:.12g}"), "unit": units[path], "source": source}
         tree = replace_at(tree, path, entry)
-    lines = [
-        f"Imported from {file}; every number says where it is from. Hip 0 is straight",
-        "down, positive swings the foot forward; knee 0 is straight, negative bends it.",
-        f"In the coordinates of {file}:",
-        *(f"  {name} = {angle}" for name, angle in leg.angles.items()),
-        *leg.notes,
-    ]
-    return ImportedRobot(tree, "\n".join(lines), assumed)
+    comment = (
+        f"Imported from {file}; every number says where it is from. Hip 0 is straight\n"
+        "down, positive swings the foot forward; knee 0 is straight, negative bends it.\n"
+        f"In the coordinates of {file}:\n"
+    )
+    return ImportedRobot(tree, comment + "\n".join(leg.notes), assumed)
 
 
 def _motor_numbers(names: tuple[str, ...]) -> dict[str, Entry]:
@@ -171,42 +167,31 @@ def _motor_limits(joint: str, known: dict[str, Entry]) -> dict[str, Entry]:
     return entries
 
 
-def _assumption(path: str, known: dict[str, Entry]) -> Entry | None:
-    """Return what is assumed for a number that nobody stated, and why; None if nothing can be."""
-    joint, _, name = path.partition(".")
-    if path in _ASSUMED:
-        return _ASSUMED[path]
-    if name in ("stop_lower", "stop_upper"):
-        reach = DEFAULT_STOPS[joint]
-        return (-reach if name == "stop_lower" else reach), "as legv2; measure where it ends"
-    if name in ("lower", "upper"):
-        return _soft_limit(joint, name, known)
-    if name.endswith(".torque_constant"):
-        motor = f"{name.partition('.')[0]}.motor"
-        if f"{motor}.no_load_speed" in known and f"{motor}.gear_ratio" in known:
-            rotor = known[f"{motor}.no_load_speed"][0] * known[f"{motor}.gear_ratio"][0]
+def _assumptions(known: Mapping[str, Entry]) -> dict[str, Entry]:
+    """Return what is assumed for numbers that nobody states, and why, given those known."""
+    found = dict(_ASSUMED)
+    for joint in JOINTS:
+        at, soft, reach = f"{joint}.motor", _SOFT[joint], DEFAULT_STOPS[joint]
+        for end, value in (("lower", -reach), ("upper", reach)):
+            found[f"{joint}.stop_{end}"] = value, "as legv2; measure where it ends"
+        stops = {**found, **known}
+        low, high = (stops[f"{joint}.stop_{end}"][0] for end in ("lower", "upper"))
+        if joint == "knee":
+            low, high = max(low, -math.pi), min(high, 0.0)
+        why, inset = "as legv2", min(_INSET, (high - low) / 4)
+        if not low <= soft[0] < soft[1] <= high:
+            soft, why = (low + inset, high - inset), f"{inset:.2g} rad inside the stop"
+        found |= {f"{joint}.{end}": (soft[i], why) for i, end in enumerate(("lower", "upper"))}
+        torque, peak = (
+            known.get(f"{at}.{key}", (0.0,))[0] for key in ("torque_limit", "peak_torque")
+        )
+        if most := peak or torque:
+            found[f"{at}.torque_limit"] = most, "the peak torque"
+            found[f"{at}.peak_torque"] = most, "the torque limit; a motor may give more"
+            found[f"{at}.rated_torque"] = _RATED_SHARE * most, "the qdd100's share of its peak"
+        if {f"{at}.no_load_speed", f"{at}.gear_ratio"} <= set(known):
+            rotor = known[f"{at}.no_load_speed"][0] * known[f"{at}.gear_ratio"][0]
+            constant = torque_constant(rotor / Hardware.bus_voltage)
             why = f"that of the motor's no-load speed at {Hardware.bus_voltage:g} V"
-            return torque_constant(rotor / Hardware.bus_voltage), why
-    torque, peak = (known.get(f"{joint}.motor.{key}") for key in ("torque_limit", "peak_torque"))
-    most = peak or torque
-    if name == "motor.torque_limit" and peak:
-        return peak[0], "the peak torque"
-    if name == "motor.peak_torque" and torque:
-        return torque[0], "the torque limit; a motor may give more"
-    if name == "motor.rated_torque" and most:
-        return _RATED_SHARE * most[0], "the qdd100's share of its peak"
-    return None
-
-
-def _soft_limit(joint: str, end: str, known: dict[str, Entry]) -> Entry:
-    """Return leg V2's soft limit where it fits between the stops, else one inside its stop."""
-    reach = DEFAULT_STOPS[joint]
-    low = known.get(f"{joint}.stop_lower", (-reach, ""))[0]
-    high = known.get(f"{joint}.stop_upper", (reach, ""))[0]
-    if joint == "knee":
-        low, high = max(low, -math.pi), min(high, 0.0)
-    usual = _SOFT[joint]
-    if low <= usual[0] and usual[1] <= high:
-        return usual[0 if end == "lower" else 1], "as legv2"
-    inset = min(_INSET, (high - low) / 4)
-    return (low + inset if end == "lower" else high - inset), f"{inset:.2g} rad inside the stop"
+            found[f"hardware.{joint}.torque_constant"] = constant, why
+    return found

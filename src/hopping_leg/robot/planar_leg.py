@@ -11,7 +11,7 @@ negative side: that decides which way is forward.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,31 +37,6 @@ _BENT = 0.1  # rad, beyond which a range or a posture tells to which side a knee
 
 
 @dataclass(frozen=True)
-class Names:
-    """What the parts are called in the file; None finds them by structure and usual names."""
-
-    hip: str | None = None
-    """Joint."""
-    knee: str | None = None
-    """Joint."""
-    foot: str | None = None
-    """Body, site or geom at the centre of the foot's sphere."""
-
-
-@dataclass(frozen=True)
-class _Parts:
-    """The joints of a leg, the bodies between them, and its foot, by their numbers in a file."""
-
-    hip: int
-    knee: int
-    rail: int | None
-    base: set[int]
-    thigh: set[int]
-    shank: set[int]
-    foot: Point
-
-
-@dataclass(frozen=True)
 class PlanarLeg:
     """What a file says of a leg."""
 
@@ -69,46 +44,54 @@ class PlanarLeg:
     numbers: dict[str, Entry]
     """By their path in a robot file, and ``hip.effort``, N m, ``hip.velocity``, rad/s, and the
     knee's, at the joint; as far as the file states them."""
-    angles: dict[str, str]
-    """Hip's and knee's angle by the file's coordinates."""
     notes: list[str]
-    """Sentences about what the file has and is not read."""
+    """Lines on hip's and knee's angle by the file's coordinates, and on what is not read."""
 
 
-def read_leg(path: Path, names: Names) -> PlanarLeg:
+def read_leg(
+    path: Path, hip: str | None = None, knee: str | None = None, foot: str | None = None
+) -> PlanarLeg:
     """Return the leg that a URDF or MJCF file describes.
+
+    Args:
+        path: The file.
+        hip: Its name of the joint; by default found by structure and usual names.
+        knee: Likewise.
+        foot: The body, site or geom at the centre of the foot's sphere; by default found likewise.
 
     Raises:
         RobotError: The file cannot be read, a part is missing or ambiguous, or the leg moves in no
             vertical plane.
     """
     tree = Description(path)
-    data, parts = tree.data, _parts(tree, names)
-    ends = np.stack([data.xanchor[parts.hip], data.xanchor[parts.knee], parts.foot.position])
-    normal, flat = _plane(tree, parts, ends)
+    data, body_of = tree.data, tree.model.jnt_bodyid
+    upper, lower = joints = _hip_and_knee(tree, hip, knee)
+    slides = tree.above(upper, _SLIDE)
+    vertical = (i for i in slides if abs(data.xaxis[i] @ tree.up) > 1 - _PARALLEL)
+    rail = next(vertical, None)
+    moving = tree.subtree(0 if rail is None else body_of[rail])
+    leg, shank = (tree.subtree(body_of[joint]) for joint in joints)
+    tip = _foot(tree, foot, shank, lower)
+    ends = np.stack([data.xanchor[upper], data.xanchor[lower], tip.position])
+    normal, flat = _plane(tree, joints, ends)
     lines = np.diff(ends, axis=0) @ flat.T
-    thigh, shank = map(float, np.arctan2(lines[:, 1], lines[:, 0]))
-    hip, hip_angle = _joint(tree, parts.hip, normal, thigh, -np.pi)
-    knee, knee_angle = _joint(tree, parts.knee, normal, shank - thigh, -1.5 * np.pi)
-    base, lengths = tree.heavy(parts.base), np.linalg.norm(lines, axis=1).tolist()
-    spheres = [point for point in tree.points(parts.shank) if point.radius > 0]
-    around = [s for s in spheres if _aside(tree, parts.hip, s.position - ends[2]) < _SAME_PLACE]
-    found: dict[str, dict[str, Entry]] = {
-        "base": {"mass": (float(tree.model.body_mass[base].sum()), _said(tree, base))},
-        "rail": {} if parts.rail is None else _losses(tree, parts.rail),
-        "hip": hip,
-        "knee": knee,
-        "thigh": {"length": (lengths[0], f"{tree.joint(parts.hip)} to {tree.joint(parts.knee)}")},
-        "shank": {"length": (lengths[1], f"{tree.joint(parts.knee)} to '{parts.foot.name}'")},
-        "foot": {"radius": (around[0].radius, f"sphere of {around[0].name}")} if around else {},
-    }
-    found["thigh"] |= _link(tree, parts.thigh, ends[0], lines[0], normal, flat)
-    found["shank"] |= _link(tree, parts.shank, ends[1], lines[1], normal, flat)
-    own = (parts.hip, parts.knee, parts.rail)
-    moving = parts.base | parts.thigh | parts.shank
-    joints = [i for i in range(tree.model.njnt) if tree.model.jnt_bodyid[i] in moving]
-    held = ", ".join(tree.joint(i) for i in joints if i not in own)
-    notes = [f"{tree.loops} equality constraints are left out."] if tree.loops else []
+    thigh, direction = np.arctan2(lines[:, 1], lines[:, 0])
+    found = {"rail": {} if rail is None else _stated(tree, rail), "base": {}}
+    found["hip"], hip_angle = _joint(tree, upper, normal, thigh, -np.pi)
+    found["knee"], knee_angle = _joint(tree, lower, normal, direction - thigh, -1.5 * np.pi)
+    if base := tree.heavy(moving - leg):
+        found["base"]["mass"] = float(tree.model.body_mass[base].sum()), _said(tree, base)
+    below = (tree.joint(lower), f"'{tip.name}'")
+    for i, (name, lump) in enumerate((("thigh", leg - shank), ("shank", shank))):
+        length = float(np.linalg.norm(lines[i])), f"{tree.joint(joints[i])} to {below[i]}"
+        found[name] = {"length": length, **_link(tree, lump, ends[i], lines[i], normal, flat)}
+    for point in tree.points(shank):
+        if point.radius > 0 and _aside(tree, upper, point.position - tip.position) < _SAME_PLACE:
+            found.setdefault("foot", {"radius": (point.radius, f"sphere of {point.name}")})
+    hinges = (i for i in range(tree.model.njnt) if body_of[i] in moving)
+    held = ", ".join(tree.joint(i) for i in hinges if i not in (*joints, rail))
+    notes = [f"  hip = {hip_angle}", f"  knee = {knee_angle}"]
+    notes += [f"{tree.loops} equality constraints are left out."] if tree.loops else []
     notes += [f"Joints held in the zero posture: {held}."] if held else []
     numbers = {
         f"{part}.{key}": (value, f"{path.name}, {source}")
@@ -116,74 +99,60 @@ def read_leg(path: Path, names: Names) -> PlanarLeg:
         for key, (value, source) in entries.items()
         if value > 0 or "stop" in key
     }
-    return PlanarLeg(tree.name, numbers, {"hip": hip_angle, "knee": knee_angle}, notes)
+    return PlanarLeg(tree.name, numbers, notes)
 
 
-def _parts(tree: Description, names: Names) -> _Parts:
-    """Return a leg's parts, the base's bodies without the leg's."""
-    hip, knee = _hip_and_knee(tree, names)
-    if abs(tree.data.xaxis[hip] @ tree.up) > _PARALLEL:
+def _named(tree: Description, option: str, kind: str, name: str, valid: Iterable[str]) -> str:
+    """Return a name that the user gave; RobotError where it is none of the valid ones."""
+    if name not in valid:
+        raise RobotError(f"{tree.origin}: --{option}: {unknown_name(kind, name, valid)}")
+    return name
+
+
+def _hip_and_knee(tree: Description, hip: str | None, knee: str | None) -> tuple[int, int]:
+    """Return the two joints: a hinge and the next one below it, with parallel, level axes."""
+    joints, axis, place = range(tree.model.njnt), tree.data.xaxis, tree.data.xanchor
+    hinges = {tree.joint(i): i for i in joints if tree.model.jnt_type[i] == _HINGE}
+    uppers, lowers = (
+        hinges.values() if name is None else [hinges[_named(tree, option, "hinge", name, hinges)]]
+        for option, name in (("hip", hip), ("knee", knee))
+    )
+    pairs = []
+    for lower in lowers:
+        upper = next((i for i in tree.above(lower, _HINGE) if i in uppers), None)
+        if upper is not None and np.linalg.norm(np.cross(axis[upper], axis[lower])) < _PARALLEL:
+            pairs.append((upper, lower))
+    for pattern, which in ((_KNEE, 1), (_HIP, 0)):
+        likely = [pair for pair in pairs if pattern.search(tree.joint(pair[which]))]
+        pairs = likely if len(pairs) > 1 and likely else pairs
+    if len(pairs) != 1:
+        found = ", ".join(f"'{name}'" for name in hinges) or "none"
+        what = "has several pairs that may be hip and knee" if pairs else "has no knee below a hip"
         raise RobotError(
-            f"{tree.origin}: the axis of '{tree.joint(hip)}' is not level, so that the leg leaves"
-            " its vertical plane; turn the file's root, or name another --hip."
+            f"{tree.origin} {what} (two hinges with parallel axes, one moved by the other); its"
+            f" hinges are: {found}. Name them with --hip and --knee."
         )
-    if _aside(tree, hip, tree.data.xanchor[knee] - tree.data.xanchor[hip]) < _SAME_PLACE:
-        both = f"'{tree.joint(hip)}' and '{tree.joint(knee)}'"
+    (pair,) = pairs
+    both = " and ".join(f"'{tree.joint(i)}'" for i in pair)
+    if abs(axis[pair[0]] @ tree.up) > _PARALLEL:
+        raise RobotError(
+            f"{tree.origin}: the axes of {both} are not level, so that the leg leaves its vertical"
+            " plane; turn the file's root, or name other joints, --hip or --knee."
+        )
+    if _aside(tree, pair[0], place[pair[1]] - place[pair[0]]) < _SAME_PLACE:
         raise RobotError(
             f"{tree.origin}: {both} turn about one axis; name others, --hip or --knee."
         )
-    slides = tree.above(hip, _SLIDE)
-    vertical = (i for i in slides if abs(tree.data.xaxis[i] @ tree.up) > 1 - _PARALLEL)
-    rail = next(vertical, None)
-    top = 0 if rail is None else tree.model.jnt_bodyid[rail]
-    leg, shank = (tree.subtree(tree.model.jnt_bodyid[joint]) for joint in (hip, knee))
-    foot = _foot(tree, names, shank, knee)
-    return _Parts(hip, knee, rail, tree.subtree(top) - leg, leg - shank, shank, foot)
+    return pair
 
 
-def _find(tree: Description, option: str, kind: str, name: str, valid: Mapping[str, int]) -> int:
-    """Return what a name of the user stands for."""
-    if name not in valid:
-        raise RobotError(f"{tree.origin}: --{option}: {unknown_name(kind, name, valid)}")
-    return valid[name]
-
-
-def _hip_and_knee(tree: Description, names: Names) -> tuple[int, int]:
-    """Return the two joints: a hinge and the next one below it, with parallel axes."""
-    joints, axis = range(tree.model.njnt), tree.data.xaxis
-    hinges = {tree.joint(i): i for i in joints if tree.model.jnt_type[i] == _HINGE}
-    wanted = {
-        option: _find(tree, option, "hinge", name, hinges)
-        for option in ("hip", "knee")
-        if (name := getattr(names, option)) is not None
-    }
-    pairs = []
-    for knee in [wanted["knee"]] if "knee" in wanted else hinges.values():
-        above = tree.above(knee, _HINGE)
-        hip = next((i for i in above if wanted.get("hip", i) == i), None)
-        if hip is not None and np.linalg.norm(np.cross(axis[hip], axis[knee])) < _PARALLEL:
-            pairs.append((hip, knee))
-    for pattern, place in ((_KNEE, 1), (_HIP, 0)):
-        likely = [pair for pair in pairs if pattern.search(tree.joint(pair[place]))]
-        pairs = likely if len(pairs) > 1 and likely else pairs
-    if len(pairs) == 1:
-        return pairs[0]
-    found = ", ".join(f"'{name}'" for name in hinges) or "none"
-    what = "has several pairs that may be hip and knee" if pairs else "has no knee below a hip"
-    raise RobotError(
-        f"{tree.origin} {what} (two hinges with parallel axes, one moved by the other); its hinges"
-        f" are: {found}. Name them with --hip and --knee."
-    )
-
-
-def _foot(tree: Description, names: Names, shank: set[int], knee: int) -> Point:
-    """Return the foot's centre: the point of that name, else of a usual one, else a sphere."""
+def _foot(tree: Description, name: str | None, shank: set[int], knee: int) -> Point:
+    """Return the foot's centre: the point of a name, else of a usual one, else a sphere."""
     points = tree.points(shank)
     likely = [point for point in points if _FOOT.search(point.name)] or points
-    if names.foot is not None:
-        known = {point.name: i for i, point in enumerate(points)}
-        _find(tree, "foot", "point below the knee", names.foot, known)
-        likely = [point for point in points if point.name == names.foot]
+    if name is not None:
+        _named(tree, "foot", "point below the knee", name, [point.name for point in points])
+        likely = [point for point in points if point.name == name]
 
     def far(point: Point) -> float:
         return _aside(tree, knee, point.position - tree.data.xanchor[knee])
@@ -205,12 +174,12 @@ def _aside(tree: Description, joint: int, vector: Array) -> float:
     return float(np.linalg.norm(np.cross(vector, tree.data.xaxis[joint])))
 
 
-def _plane(tree: Description, parts: _Parts, ends: Array) -> tuple[Array, Array]:
+def _plane(tree: Description, joints: tuple[int, int], ends: Array) -> tuple[Array, Array]:
     """Return the axis about which positive turns swing forward, and down and forward as rows.
 
     Of the two ways forward it is that to which the knee sticks out.
     """
-    axis = tree.data.xaxis[parts.hip]
+    axis = tree.data.xaxis[joints[0]]
     level = axis - (axis @ tree.up) * tree.up
     normal = level / np.linalg.norm(level)
     forward = np.cross(tree.up, normal)
@@ -219,9 +188,9 @@ def _plane(tree: Description, parts: _Parts, ends: Array) -> tuple[Array, Array]
     lines = np.diff(ends, axis=0)
     thigh, shank = np.arctan2(lines @ forward, -lines @ tree.up)
     bend = _wrapped(shank - thigh)
-    stops = _stops(tree, parts.knee)
+    stops = _stops(tree, joints[1])
     if stops is not None and stops[1] < stops[0] + _TURN:
-        sign = float(np.sign(tree.data.xaxis[parts.knee] @ normal))
+        sign = float(np.sign(tree.data.xaxis[joints[1]] @ normal))
         middle = _wrapped(sign * sum(stops) / 2 + bend)
         bend = middle if abs(middle) > _BENT else bend
     if bend > _BENT:
@@ -241,9 +210,9 @@ def _stops(tree: Description, joint: int) -> tuple[float, float] | None:
     return (low, high) if limited else None
 
 
-def _losses(tree: Description, joint: int) -> dict[str, Entry]:
-    """Return a joint's friction and damping."""
-    return {key: (v, f"joint {tree.joint(joint)}") for key, v in tree.losses(joint).items()}
+def _stated(tree: Description, joint: int) -> dict[str, Entry]:
+    """Return what is stated of a joint but its stops."""
+    return {key: (v, f"joint {tree.joint(joint)}, {key}") for key, v in tree.numbers(joint).items()}
 
 
 def _joint(
@@ -255,8 +224,7 @@ def _joint(
     """
     sign = 1 if tree.data.xaxis[joint] @ normal > 0 else -1
     name, zero, offset = tree.joint(joint), tree.zero(joint), round(_wrapped(direction), 12)
-    entries = _losses(tree, joint)
-    entries |= {key: (v, f"joint {name}, {key}") for key, v in tree.drive(joint).items()}
+    entries = _stated(tree, joint)
     if (stops := _stops(tree, joint)) is not None:
         offset -= _TURN * float(np.floor((sign * sum(stops) / 2 + offset - least) / _TURN))
         ends = sorted(sign * end + offset for end in stops)
@@ -281,7 +249,8 @@ def _link(
     mass = float(masses.sum())
     com = masses @ coms / mass
     across = np.einsum("bij,i->bj", data.ximat[bodies].reshape(-1, 3, 3), normal)
-    own = np.sum(tree.inertia[bodies] * across**2) + masses @ np.sum((coms - com) ** 2, axis=1)
+    own = float(np.sum(model.body_inertia[bodies] * across**2))
+    own += float(masses @ np.sum((coms - com) ** 2, axis=1))
     length, across_line = np.linalg.norm(line), np.array([-line[1], line[0]])
     along, beside = float(com @ line / length), float(com @ across_line / length)
     said = _said(tree, bodies)
@@ -289,7 +258,7 @@ def _link(
     return {
         "mass": (mass, said),
         "com": (along, f"{said}, along the link{left if abs(beside) > 1e-6 else ''}"),
-        "inertia": (float(own) + mass * beside**2, f"{said}, about the centre of mass"),
+        "inertia": (own + mass * beside**2, f"{said}, about the centre of mass"),
     }
 
 
