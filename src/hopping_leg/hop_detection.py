@@ -1,8 +1,7 @@
 """Hops in a run: flights, apexes, bounces that never left the ground, skipped hops.
 
 A flight is a stretch of time with the foot at least 3 mm clear of the ground, an apex a maximum of
-the base height in it. A hop is a flight with an apex; of several apexes in one flight, as a leg
-that is swung hard at the top has them, the highest is that of the hop.
+the base height in it. A hop is a flight with an apex; the highest of several is that of the hop.
 """
 
 from dataclasses import dataclass
