@@ -99,13 +99,11 @@ class Description:
 
     def joint(self, number: int) -> str:
         """Return a joint's name."""
-        name: str = self.model.joint(number).name
-        return name
+        return str(self.model.joint(number).name)
 
     def body(self, number: int) -> str:
         """Return a body's name."""
-        name: str = self.model.body(number).name
-        return name
+        return str(self.model.body(number).name)
 
     def heavy(self, bodies: Iterable[int]) -> list[int]:
         """Return those bodies that have a mass, in the file's order."""
