@@ -73,13 +73,10 @@ def test_a_hip_that_turns_the_other_way_never_hops(emulated, tmp_path, homed):
     done = run(wrong, tmp_path / "wrong.parquet", rise=2.0, checked=LEG)
     assert done.outcome.supervisor.stop_cause.reason is Reason.STANDS_WRONG
     assert np.isnan(done.trace.column("hip_command_nm")).all()
-    right = run(emulated(), tmp_path / "right.parquet", rise=2.0, checked=LEG)
-    assert right.outcome.supervisor.stop_cause.reason is Reason.FINISHED
-    for trace, upright in ((done.trace, False), (right.trace, True)):
-        (event,) = (event for event in trace.header["events"] if "squat" in event)
-        part, time = trace.column("part"), trace.column("time_s")
-        assert event["time_s"] == pytest.approx(time[part == Part.SQUAT][-1] + 0.005, abs=0.006)
-        assert (abs(event["squat"]["sideways"]) < 0.2) == upright
+    (event,) = (event for event in done.trace.header["events"] if "squat" in event)
+    part, time = done.trace.column("part"), done.trace.column("time_s")
+    assert event["time_s"] == pytest.approx(time[part == Part.SQUAT][-1] + 0.005, abs=0.006)
+    assert abs(event["squat"]["sideways"]) > 0.2
 
 
 def test_healthy_drives_pass_every_check_and_say_who_they_are(emulated):
@@ -184,10 +181,9 @@ OTHERS = [
     (Fault("power_loss", at=0.9, drive="hip"), "DRIVE_LEFT_MODE"),
     (Fault("limit_notice", at=0.9), "FINISHED"),
 ]
-SLOW = [("fast", *case) for case in QUICK + OTHERS] + [("energy-shaping", *c) for c in OTHERS]
 CASES = [
     *(("energy-shaping", *case) for case in QUICK),
-    *(pytest.param(*case, marks=pytest.mark.slow) for case in SLOW),
+    *(pytest.param("fast", *case, marks=pytest.mark.slow) for case in OTHERS),
 ]
 
 

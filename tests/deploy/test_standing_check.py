@@ -12,7 +12,7 @@ from hopping_leg.sim import LegSimulator, Measurement
 from tests.deploy.fakes import Still
 
 TIMING = SequenceTiming(rise=1.5)
-COUNT = 24
+COUNT = 12
 
 
 @pytest.mark.parametrize("robot", ["legv2", "legv2-identified", "legv1"])
