@@ -39,14 +39,6 @@ def test_every_leg_follows_with_the_default_gains(name):
         assert np.abs(torque).max() < 6.0
 
 
-@pytest.mark.parametrize(
-    ("wrong", "sentence"),
-    [
-        (lambda: JointPD(np.zeros((0, 2))), "must be"),
-        (lambda: JointPD(np.zeros((5, 3))), "must be"),
-        (lambda: JointGains(damping=(-1.0, 0.0)), "damping"),
-    ],
-)
-def test_other_shapes_and_negative_gains_are_refused(wrong, sentence):
-    with pytest.raises(UsageError, match=sentence):
-        wrong()
+def test_negative_gains_are_refused():
+    with pytest.raises(UsageError, match="damping"):
+        JointGains(damping=(-1.0, 0.0))

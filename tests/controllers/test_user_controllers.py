@@ -131,13 +131,13 @@ def test_what_cannot_be_loaded_is_one_sentence(tmp_path, content, name, says):
         load_controller(tmp_path / name, ROBOT)
 
 
-def test_a_trace_keeps_its_own_columns(tmp_path):
-    text = BATCHED + "    def internals(self):\n        return {'height_m': 1.0}\n"
+def test_what_is_recorded_of_a_controller_does_not_replace_what_is_of_the_leg(tmp_path):
+    text = BATCHED + "    def internals(self):\n        return {'height_m': 9.0, 'mine': 1.0}\n"
     path = written(tmp_path / "mine.py", text, answer="np.zeros((self.count, 2))")
     controller = load_controller(f"{path}:Held", ROBOT)
-    controller.reset(1)
-    with pytest.raises(ControllerError, match="'height_m'"):
-        controller.internals()
+    run = rollout(controller, RolloutConfig(ROBOT, threads=1), np.full((3, 1), 0.3), seed=0)
+    assert run.data["height_m"].max() < 1
+    assert (run.data["mine"] == 1).all()
 
 
 def test_an_edited_file_is_another_controller(tmp_path):

@@ -50,8 +50,6 @@ def test_no_use_of_the_simulator_compiles_anything_anew():
         legs.step(torque)
     for kind in (np.int64, np.float32):
         legs.step(np.zeros((2, 2), kind))
-        legs.step_drives(np.zeros((2, stepper.COMMAND), kind))
-    legs.step_drives(np.zeros((stepper.COMMAND, 2)).T)
     legs.push(np.arange(2))
     legs.place([1], 0.3, (1, -1))
     legs.restore({**legs.memory(), "past": np.asfortranarray(legs.memory()["past"])})

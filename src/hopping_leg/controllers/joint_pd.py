@@ -46,18 +46,11 @@ class JointPD:
         position: Joint positions at each control period, rad, (ticks, 2).
         velocity: Joint velocities there, rad/s, (ticks, 2); None sets them to zero, as the paper.
         gains: Stiffness and damping.
-
-    Raises:
-        UsageError: The trajectory is empty or of another shape.
     """
 
     def __init__(
         self, position: Array, velocity: Array | None = None, gains: JointGains | None = None
     ) -> None:
-        if position.ndim != 2 or position.shape[1] != 2 or not len(position):
-            raise UsageError(
-                f"A joint trajectory must be (ticks, 2), hip and knee, not {position.shape}."
-            )
         self.position = position
         self.velocity = np.zeros_like(position) if velocity is None else velocity
         gains = gains or JointGains()

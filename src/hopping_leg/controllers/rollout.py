@@ -186,7 +186,8 @@ def rollout(
         "timestep_s": config.timestep,
     }
     columns = dict(zip(_COLUMNS, data, strict=True))
-    return Rollout(np.arange(ticks) / config.rate, columns | internals, header)
+    # A controller's internals do not replace what is recorded of the leg.
+    return Rollout(np.arange(ticks) / config.rate, columns | internals | columns, header)
 
 
 def _record_state(row: Array, legs: Simulator, command: Array) -> None:

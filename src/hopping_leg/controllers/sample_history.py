@@ -148,29 +148,25 @@ class DatedObserver:
 
     def _fill(self) -> Array:
         """Return velocities of the window with the gaps filled, (WINDOW, n, 2)."""
-        known = self._track.known
-        filled = self._track.qd.copy()
-        newer, gap = filled[0], np.full(known.shape[1], np.inf)
-        ahead_value, ahead_gap = np.empty_like(filled), np.empty(known.shape)
-        for i in range(WINDOW):
-            newer = np.where(known[i, :, None], filled[i], newer)
-            gap = np.where(known[i], 0.0, gap + 1)
-            ahead_value[i], ahead_gap[i] = newer, gap
-        for i in range(WINDOW - 2, -1, -1):
-            share = 1 / (1 + ahead_gap[i])[:, None]
-            between = filled[i + 1] + share * (ahead_value[i] - filled[i + 1])
-            filled[i] = np.where(known[i, :, None], filled[i], between)
+        known, filled, ticks = self._track.known, self._track.qd.copy(), np.arange(WINDOW)[:, None]
+        newer = np.maximum.accumulate(np.where(known, ticks, -1))
+        ahead = np.take_along_axis(filled, np.maximum(newer, 0)[..., None], axis=0)
+        share = np.where(newer < 0, 0.0, 1 / (1 + ticks - newer))[..., None]
+        for i in np.flatnonzero(~known[:-1].all(axis=1))[::-1]:
+            between = filled[i + 1] + share[i] * (ahead[i] - filled[i + 1])
+            np.copyto(filled[i], between, where=~known[i, :, None])
         return filled
 
     def _integrate(self, velocity: Array) -> list[Array]:
         """Return filtered positions of the window, newest first."""
         assert self._anchor is not None
-        weight = self.gain * self._track.known[..., None]
+        weight, measured = self.gain * self._track.known[..., None], self._track.q
+        moved = (0.5 * self.period) * (velocity[1:] + velocity[:-1])
         position = self._anchor
         past = [position]
         for i in range(WINDOW - 2, -1, -1):
-            position = position + (0.5 * self.period) * (velocity[i + 1] + velocity[i])
-            position = position + weight[i] * (self._track.q[i] - position)
+            position = position + moved[i]
+            position = position + weight[i] * (measured[i] - position)
             past.append(position)
         past.reverse()
         return past

@@ -26,7 +26,6 @@ from hopping_leg.arrays import Array
 from hopping_leg.errors import ControllerError, HoppingLegError, unknown_name
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.channel import Measurement
-from hopping_leg.trace import COLUMNS
 
 METHOD = "get_control_output"  # of a controller of one leg
 
@@ -86,24 +85,13 @@ class UserController:
         return torque
 
     def internals(self) -> dict[str, Array]:
-        """Return what the controller wants recorded of the last ``act``, each (n,).
-
-        Raises:
-            ControllerError: It is no dictionary of (n,), or would replace a column of the trace.
-        """
-        if not hasattr(self.controller, "internals"):
-            return {}
+        """Return what the controller wants recorded of the last ``act``, each (n,)."""
         with guarded(self.origin):
-            found = {
+            found: dict[str, Any] = getattr(self.controller, "internals", dict)()
+            return {
                 name: np.broadcast_to(np.asarray(values, np.float64), self._count)
-                for name, values in self.controller.internals().items()
+                for name, values in found.items()
             }
-        if taken := set(found) & set(COLUMNS):
-            raise ControllerError(
-                f"'internals' of controller '{self.origin}' names '{min(taken)}', which every trace"
-                " has; choose another name."
-            )
-        return found
 
 
 def is_user_controller(name: str) -> bool:

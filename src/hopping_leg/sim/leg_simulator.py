@@ -60,9 +60,11 @@ class LegSimulator(Simulator):
         ends = np.linspace(0, count, parts + 1).astype(int).tolist()
         self._parts = list(itertools.pairwise(ends))
         self._show(np.zeros((count, 6)))
-        self._memory = np.zeros(count, stepper.MEMORY)
+        self.records: Records = np.zeros(count, stepper.MEMORY)
+        """What each leg remembers besides its state, live, (n,) of ``MEMORY``."""
         self._push = np.zeros(count)
-        self._command = np.zeros((count, stepper.COMMAND))
+        self.command = np.zeros((count, stepper.COMMAND))
+        """What drives are commanded beside the torques that ``step`` takes, live."""
         self._jitter = np.zeros(count)
         self._reading = np.zeros((count, 6))
         self._past = np.zeros((count, 0, 6))
@@ -98,7 +100,7 @@ class LegSimulator(Simulator):
         depth = 2 + int(np.ceil(table["measurement_latency"].max() / self.timestep)) if late else 0
         if depth > self._past.shape[1]:
             self._past = np.repeat(self._true_reading()[:, None], depth, axis=1)
-            self._memory["newest"] = 0.0
+            self.records["newest"] = 0.0
         disturbed = late or self._noisy or table["sensor_step"].any() or table["elastic"].any()
         if disturbed and not self._disturbed:
             self._reading[:] = stepper.rounded(self._true_reading(), table["sensor_step"])
@@ -106,8 +108,8 @@ class LegSimulator(Simulator):
 
     def _true_reading(self) -> Array:
         """Return what undisturbed sensors would report, (n, 6)."""
-        rotor = self._memory["rotor"] if self._disturbed else self.state[:, [1, 2, 4, 5]]
-        return np.concatenate([rotor, self._memory["motor_torque"]], axis=1)
+        rotor = self.records["rotor"] if self._disturbed else self.state[:, [1, 2, 4, 5]]
+        return np.concatenate([rotor, self.records["motor_torque"]], axis=1)
 
     @property
     def measured_q(self) -> Array:
@@ -122,18 +124,13 @@ class LegSimulator(Simulator):
     @property
     def measured_torque(self) -> Array:
         """What the motors' torque measurement reports now, N m at the joints, (n, 2)."""
-        return self._reading[:, 4:6] if self._disturbed else self._memory["motor_torque"]
+        return self._reading[:, 4:6] if self._disturbed else self.records["motor_torque"]
 
     @property
     def loads(self) -> Array:
         """What the last control period was for the motors, (n, 8), see ``LOADS``."""
-        loads: Array = self._memory["loads"]
+        loads: Array = self.records["loads"]
         return loads
-
-    @property
-    def records(self) -> Records:
-        """What each leg remembers besides its state, live, (n,) of ``MEMORY``."""
-        return self._memory
 
     def reseed(self, rng: np.random.Generator) -> None:
         """Take jitter and sensor noise from here on from another source."""
@@ -156,9 +153,9 @@ class LegSimulator(Simulator):
     def forget(self, ids: IntArray | slice) -> None:
         """Let legs begin anew in their state: no command under way, clean readings."""
         rows = np.arange(self.count)[ids]
-        self._memory[rows] = np.zeros((), stepper.MEMORY)
+        self.records[rows] = np.zeros((), stepper.MEMORY)
         rotor = self.state[rows][:, [1, 2, 4, 5]]
-        self._memory["rotor"][rows] = rotor
+        self.records["rotor"][rows] = rotor
         self._reading[rows, :4], self._reading[rows, 4:] = rotor, 0
         self._past[rows] = self._reading[rows, None]
         step = self.table["sensor_step"][rows]
@@ -166,37 +163,31 @@ class LegSimulator(Simulator):
 
     def step(self, torque: Array) -> Array:
         """Command joint torques for a control period; return the motors' mean, N m, (n, 2)."""
-        self._command[:, :2] = torque
-        return self._step(self._command)
-
-    def step_drives(self, command: Array) -> Array:
-        """Command the drives' own PD for a control period, (n, ``COMMAND``); return as ``step``."""
-        return self._step(np.array(command, np.float64, order="C"))
-
-    def _step(self, command: Array) -> Array:
+        self.command[:, :2] = torque
         if self._jitters:
             self._jitter = self.rng.random(self.count)
         self.in_parallel(
             lambda first, last: stepper.step_legs(
-                self.table, self.state, self._memory, self._past, command, self._jitter,
+                self.table, self.state, self.records, self._past, self.command, self._jitter,
                 self._push, first, last, self.substeps, self.timestep,
             )
         )  # fmt: skip
         self.read_sensors()
-        return self._memory["mean_torque"].copy()
+        return self.records["mean_torque"].copy()
 
     def read_sensors(self) -> None:
         """Let the sensors report anew, with other noise; a step ends with it."""
         if self._disturbed:
             draws = self.rng.standard_normal((self.count, 6)) if self._noisy else self._reading
             stepper.read_sensors(
-                self.table, self._memory, self._past, draws, self._reading, self.timestep
+                self.table, self.records, self._past, draws, self._reading, self.timestep
             )
 
     def in_parallel(self, work: Callable[[int, int], None]) -> None:
         """Do something for the legs from a first to before a last one, on as many threads."""
         first, *others = self._parts
-        futures = [thread_pool().submit(work, *part) for part in others]
+        # A fork has none of its parent's threads.
+        futures = [_threads(os.getpid()).submit(work, *part) for part in others]
         work(*first)
         for future in futures:
             future.result()
@@ -206,7 +197,7 @@ class LegSimulator(Simulator):
         return {
             "state": self.state.copy(),
             "push": self._push.copy(),
-            "memory": self._memory.view(np.float64).reshape(self.count, -1).copy(),
+            "memory": self.records.view(np.float64).reshape(self.count, -1).copy(),
             "reading": self._reading.copy(),
             "past": self._past.copy(),
             "rng": self.rng.bit_generator.state,
@@ -216,7 +207,7 @@ class LegSimulator(Simulator):
         """Go on from a ``memory``."""
         self.state[:], self._push[:] = memory["state"], memory["push"]
         self._reading[:] = memory["reading"]
-        self._memory.view(np.float64).reshape(self.count, -1)[:] = memory["memory"]
+        self.records.view(np.float64).reshape(self.count, -1)[:] = memory["memory"]
         self._past = np.array(memory["past"], np.float64, order="C")
         self.rng.bit_generator.state = memory["rng"]
 
@@ -234,11 +225,6 @@ def compile_physics() -> None:
     stepper.read_sensors(table, memory, past, rows, rows, TIMESTEP)
 
 
-def thread_pool() -> ThreadPoolExecutor:
-    """Return the threads of this process, one per core; a fork has none of its parent's."""
-    return _pool(os.getpid())
-
-
 @cache
-def _pool(process: int) -> ThreadPoolExecutor:
+def _threads(process: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix=f"stepper-{process}")

@@ -16,13 +16,12 @@ from hopping_leg.controllers.energy_shaping.virtual_leg import (
     Phase,
     Phases,
     TouchdownDetector,
-    flight_torque,
     foot_force_torque,
     retraction,
     view_leg,
 )
 from hopping_leg.controllers.sample_history import DatedObserver
-from hopping_leg.robot import Robot, kinematics
+from hopping_leg.robot import JOINTS, Robot, kinematics
 from hopping_leg.sim import CONTROL_RATE, Measurement
 
 
@@ -56,6 +55,10 @@ class EnergyShaping:
         self._observer = DatedObserver(self.period, self.gains.position_pull)
         self._observer.reset(count)
         self._detector = TouchdownDetector(self.robot, count, debounced=self.debounced)
+        self._stiffness, self._damping = (
+            np.stack([getattr(self.gains, f"{joint}_{kind}") for joint in JOINTS], axis=-1)
+            for kind in ("stiffness", "damping")
+        )
         self._phases = Phases(count)
         self._k_ratio = np.ones(count)
         self._length_0 = np.full(count, np.nan)
@@ -82,12 +85,12 @@ class EnergyShaping:
         target = kinematics.joint_angles(self.robot, np.stack([landing, 0 * landing], axis=-1))
         clock = self._phases.clock
         posture, posture_rate = retraction(self._liftoff_q, target, clock, gains.retract_time)
-        flying = flight_torque(gains, leg, posture, posture_rate)
+        flying = self._stiffness * (posture - leg.q) + self._damping * (posture_rate - leg.qd)
         self._end_flight(leg, posture_rate, flying, command)
         self._estimate_height(leg)
         push = self._force(leg, command, liftoff, landing)
         side = -gains.kp_y * leg.y - gains.kd_y * leg.y_rate
-        pressing = foot_force_torque(self.robot, leg.q, push, side)
+        pressing = foot_force_torque(leg, push, side)
         share = np.where(self._phases.are(Phase.FLIGHT), 0.0, 1.0)
         pushes = self._phases.are(Phase.LIFTOFF)
         self._share = np.where(pushes, self._pushing_share(leg, liftoff), share)

@@ -33,34 +33,34 @@ class LegView:
     """Its derivative, m/s, (n,)."""
     stand: Array
     """Base height if the foot stood on hard ground, m, (n,)."""
+    jacobian: Array
+    """Of the foot's position below and in front of the hip, m, (n, 2, 2)."""
 
 
 def view_leg(robot: Robot, q: Array, qd: Array) -> LegView:
     """Return the virtual leg of joint positions and velocities, rad, rad/s, (n, 2)."""
     foot = kinematics.foot_position(robot, q)
-    speed = kinematics.foot_velocity(robot, q, qd)
+    jacobian = kinematics.jacobian(robot, q)
+    speed = np.einsum("nij,nj->ni", jacobian, qd)
     stand = foot[:, 0] + robot.foot.radius
-    return LegView(q, qd, foot[:, 0], speed[:, 0], foot[:, 1], speed[:, 1], stand)
+    return LegView(q, qd, foot[:, 0], speed[:, 0], foot[:, 1], speed[:, 1], stand, jacobian)
 
 
-def foot_force_torque(robot: Robot, q: Array, push: Array, side: Array) -> Array:
+def foot_force_torque(leg: LegView, push: Array, side: Array) -> Array:
     """Return the joint torques that press the foot with a force, N m, (n, 2).
 
-    The Jacobian is that of (x_down, y), so a positive ``push`` presses the foot to the ground, N,
-    (n,); ``side`` is the force forwards.
+    A positive ``push`` presses the foot to the ground, N, (n,); ``side`` is the force forwards.
     """
-    force = np.stack(np.broadcast_arrays(push, side), axis=-1)
-    torque: Array = np.einsum("nij,ni->nj", kinematics.jacobian(robot, q), force)
+    torque: Array = np.einsum("nij,ni->nj", leg.jacobian, np.stack([push, side], axis=-1))
     return torque
 
 
-def leg_force(robot: Robot, q: Array, torque: Array) -> Array:
-    """Return the force along the leg that joint torques press with at rest, N, (n,).
+def leg_force(robot: Robot, leg: LegView, torque: Array) -> Array:
+    """Return the force along the leg that joint torques, N m, (n, 2), press with at rest, N, (n,).
 
-    Joint positions are in rad, torques in N m, (n, 2). The straight leg is singular; there the
-    force of a slightly bent one is returned.
+    The straight leg is singular; there the force of a slightly bent one is returned.
     """
-    (a, b), (c, d) = np.moveaxis(kinematics.jacobian(robot, q), 0, -1)
+    (a, b), (c, d) = np.moveaxis(leg.jacobian, 0, -1)
     determinant = a * d - b * c
     least = 0.1 * robot.thigh.length * robot.shank.length
     bounded = np.where(determinant < 0, -1.0, 1.0) * np.maximum(np.abs(determinant), least)
@@ -74,14 +74,6 @@ def retraction(start: Array, end: Array, elapsed: Array, duration: Gain) -> tupl
     share = elapsed[:, None] / lasts
     rate = (end - start) * kinematics.smooth_step_rate(share) / lasts
     return start + (end - start) * kinematics.smooth_step(share), rate
-
-
-def flight_torque(gains: ShapingGains, leg: LegView, target: Array, rate: Array) -> Array:
-    """Return the torques of the flight PD towards a posture that moves, N m, (n, 2)."""
-    stiffness = np.broadcast_arrays(gains.hip_stiffness, gains.knee_stiffness)
-    damping = np.broadcast_arrays(gains.hip_damping, gains.knee_damping)
-    behind, slower = target - leg.q, rate - leg.qd
-    return np.stack(stiffness, axis=-1) * behind + np.stack(damping, axis=-1) * slower
 
 
 PUSH_LIMIT = 0.4  # longest push, s: a leg without lift-off by then gives up and tries afresh
@@ -127,9 +119,6 @@ class Phases:
         self.clock = np.where(who, since, self.clock)
 
 
-_MEMORY = 3
-
-
 class TouchdownDetector:
     """Watches how n legs deviate from the planned retraction.
 
@@ -137,9 +126,8 @@ class TouchdownDetector:
     """
 
     def __init__(self, robot: Robot, count: int, *, debounced: bool) -> None:
-        self._robot, depth = robot, _MEMORY if debounced else 1
-        self._excess = np.zeros((depth, count))
-        self._resisting = np.zeros((depth, count))
+        self._robot = robot
+        self._seen = np.zeros((3 if debounced else 1, 2, count))
 
     def update(self, leg: LegView, planned: Array, torque: Array, gains: ShapingGains) -> BoolArray:
         """Return which legs meet the ground, (n,): a soft one gives way, a stiff one resists.
@@ -147,12 +135,9 @@ class TouchdownDetector:
         Planned are the joint velocities of the retraction, rad/s; torques are those of the flight
         PD, N m, (n, 2) each; the gains hold the thresholds.
         """
-        along = kinematics.jacobian(self._robot, leg.q)[:, 0]
-        excess = leg.rate - np.einsum("ni,ni->n", along, planned)
-        force = leg_force(self._robot, leg.q, torque)
-        for history, newest in ((self._excess, excess), (self._resisting, force)):
-            history[1:] = history[:-1].copy()
-            history[0] = newest
-        yields: BoolArray = np.median(self._excess, axis=0) < gains.touchdown_rate
-        resists: BoolArray = np.median(self._resisting, axis=0) > gains.touchdown_force
-        return yields | resists
+        self._seen[1:] = self._seen[:-1].copy()
+        self._seen[0, 0] = leg.rate - np.einsum("ni,ni->n", leg.jacobian[:, 0], planned)
+        self._seen[0, 1] = leg_force(self._robot, leg, torque)
+        excess, force = np.sort(self._seen, axis=0)[len(self._seen) // 2]
+        touched: BoolArray = (excess < gains.touchdown_rate) | (force > gains.touchdown_force)
+        return touched
