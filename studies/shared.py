@@ -10,20 +10,19 @@ import inspect
 import json
 import os
 import platform
-import re
 import shlex
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.cli import guard, read_options
-from hopping_leg.cli.options import KEPT, command_line, save_json, show_table
+from hopping_leg.cli import COMMAND, guard, read_options
+from hopping_leg.cli.options import save_json, show_table
 from hopping_leg.errors import UsageError
 from hopping_leg.io import versions, write_atomically, write_json
 from hopping_leg.sim import compile_physics
@@ -62,21 +61,14 @@ def main(
 
 def _run(name: str, options: Any, given: Sequence[str]) -> int:  # noqa: ANN401
     program = f"python -m studies.{name}"
+    COMMAND.set(shlex.join([*program.split(), *given]))
     about = inspect.getdoc(importlib.import_module(f"studies.{name}"))
     args = read_options(options, program, about, given)
-    if get_args(options):
-        program = f"{program} {_word_of(type(args))}"
-    command = command_line(program, args, KEPT | {"recordings"})
-    result = {"command": command, **args.measure()}
+    result = {"command": COMMAND.get(), **args.measure()}
     save_json(args.json, result)
     if args.json is not None:
         print(f"Wrote {args.json}.")
     return 0
-
-
-def _word_of(kind: type) -> str:
-    """Return the word that tyro gives to a dataclass among several, e.g. ``zero-shot``."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", kind.__name__).lower()
 
 
 def results(name: str) -> tuple[str, ...]:

@@ -12,7 +12,6 @@ import pytest
 
 import hopping_leg
 from hopping_leg.cli import read_options
-from hopping_leg.cli.doctor import PURPOSES
 from hopping_leg.cli.view import View
 from tests.doc_pages import ROOT
 
@@ -66,10 +65,6 @@ def test_the_container_is_built_by_the_commands_of_the_readme():
     assert all(command in readme for command in commands)
     (call,) = [json.loads(line.removeprefix("CMD ")) for line in lines if line.startswith("CMD ")]
     assert not read_options(View, "hop demo", None, call[1:]).browser
-
-
-def test_doctor_knows_every_extra():
-    assert set(PURPOSES) == set(PROJECT["optional-dependencies"])
 
 
 def test_the_installed_version_is_the_projects_and_is_in_the_changelog():

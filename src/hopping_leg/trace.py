@@ -109,7 +109,7 @@ class Trace:
         if "hopping_leg" not in metadata:
             raise TraceError(
                 f"{path} is a Parquet file but not a trace;"
-                " record one with `hop evaluate --traces DIR`."
+                " record one with `hop evaluate --out DIR`."
             )
         header = parse_json(metadata["hopping_leg"], f"{path}: its header", TraceError)
         schema = header.pop("schema", None)

@@ -18,7 +18,8 @@ import numpy as np
 
 from hopping_leg import hop_detection
 from hopping_leg.arrays import Array
-from hopping_leg.cli.options import JsonFile, RobotFile, command_line, say, say_next, show_table
+from hopping_leg.cli import COMMAND
+from hopping_leg.cli.options import JsonFile, RobotFile, say, show_table
 from hopping_leg.controllers import Rollout, RolloutConfig, rollout
 from hopping_leg.controllers.energy_shaping.controller import EnergyShaping
 from hopping_leg.controllers.energy_shaping.gains import (
@@ -145,7 +146,6 @@ class Tune:
             ],
         )
         say(f"Gains: {self.gains}")
-        say_next(["hop", "evaluate", self.gains, "--robot", self.robot])
         return tuned
 
     @property
@@ -167,8 +167,7 @@ class Tune:
         ]
         costs = [cost(s, self.flight) for s in scores]
         better = pair[1] if costs[1] < costs[0] else pair[0]
-        command = command_line("python -m studies.energy_shaping.tune", self)
-        save_gains(self.gains, GainFile(self.robot, command, better))
+        save_gains(self.gains, GainFile(self.robot, COMMAND.get(), better))
         return {
             "generations": self.generations,
             "seed": self.seed,

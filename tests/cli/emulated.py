@@ -5,9 +5,7 @@ import functools
 
 import numpy as np
 
-from hopping_leg.cli import deploy, record
-from hopping_leg.deploy import hardware_trials, moteus_link, transport
-from hopping_leg.deploy.motion_sequence import SequenceTiming
+from hopping_leg.deploy import hardware_trials, moteus_link, motion_sequence, transport
 from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.identify.excitation import Excitation
@@ -26,9 +24,8 @@ def put_behind(monkeypatch, *, clamped=False, **start):
     monkeypatch.setattr(transport, "open_transport", lambda name: None)
     monkeypatch.setattr(moteus_link, "MoteusLink", lambda robot, transport: lockstep.link)
     monkeypatch.setattr(hardware_trials, "RealClock", lambda: lockstep)
-    quick = functools.partial(SequenceTiming, rise=0.4, settle=0.1, sink=0.5)
-    for verb in (deploy, record):
-        monkeypatch.setattr(verb, "SequenceTiming", quick)
+    quick = functools.partial(motion_sequence.SequenceTiming, rise=0.4, settle=0.1, sink=0.5)
+    monkeypatch.setattr(motion_sequence, "SequenceTiming", quick)
     quiet = contextlib.nullcontext(())
     monkeypatch.setattr(hardware_trials, "keeping_time", lambda **_: quiet)
     return lockstep

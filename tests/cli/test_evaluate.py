@@ -1,13 +1,16 @@
+import dataclasses
 import json
+import shutil
 
 import pytest
 
 from hopping_leg.cli import main
-from hopping_leg.cli.evaluate import Evaluate
-from hopping_leg.controllers.registry import load_policy
+from hopping_leg.cli.evaluate import Evaluate, load
+from hopping_leg.controllers.registry import ROBOT_FILE, load_policy, robot_of
 from hopping_leg.evaluate.runner import setup_conditions
-from hopping_leg.robot import DEFAULT_ROBOT
+from hopping_leg.robot import DEFAULT_ROBOT, load_robot
 from hopping_leg.trace import Trace
+from tests.doc_pages import ROOT
 
 
 def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys):
@@ -55,14 +58,13 @@ def test_robustness_leaves_numbers_and_figure(spring, tmp_path, capsys):
     assert [row["axis"] for row in data["scores"]] == ["pushes", "overall"]
     assert all(0 <= row["low"] <= row["score"] <= row["high"] <= 1 for row in data["scores"])
     assert data["command"].startswith("hop evaluate spring")
-    assert "--axes pushes" in data["command"]
     assert (out / "robustness.svg").read_bytes().startswith(b"<?xml")
     assert "overall" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("on", [True, False])
 def test_soft_limits_may_be_left_out(on):
-    _, setup = Evaluate(("energy-shaping",), soft_limits=on).load()
+    _, setup = load(Evaluate(("energy-shaping",), soft_limits=on))
     assert (setup.soft_limits is not None) == on
     assert (setup_conditions(setup)["soft_limits"] is not None) == on
 
@@ -76,5 +78,38 @@ def test_soft_limits_may_be_left_out(on):
     ],
 )
 def test_the_leg_is_that_of_the_first_policy_unless_another_is_named(controllers, given, robot):
-    _, setup = Evaluate(controllers, robot=given).load()
+    _, setup = load(Evaluate(controllers, robot=given))
     assert setup.robot.name == robot
+
+
+def test_a_policy_is_judged_on_the_robot_that_lies_beside_it(tmp_path, monkeypatch, capsys):
+    onnx_export = pytest.importorskip("hopping_leg.rl.onnx_export")
+    from hopping_leg.rl.run_folder import write_robot
+
+    monkeypatch.setattr("hopping_leg.evaluate.trials.FIXED_SECONDS", 3.0)
+    monkeypatch.setattr("hopping_leg.evaluate.trials.STEP_SECONDS", 2.0)
+    monkeypatch.chdir(tmp_path)
+    robot, policy = load_robot(ROOT / "examples/my_leg.toml"), load_policy("fast")
+    folder = tmp_path / "runs" / "my run"
+    folder.mkdir(parents=True)
+    file, beside = folder / "policy.onnx", str(folder / ROBOT_FILE)
+    card = dataclasses.replace(policy.card, robot=robot.name, robot_digest=robot.digest)
+    file.write_bytes(onnx_export.with_card(policy.content, card))
+    write_robot(folder, robot)
+    assert load_robot(beside) == robot
+    for named in (str(file), f"mine={file}"):
+        assert robot_of([named]) == beside
+    assert robot_of(["runs/*/policy.onnx"]) == "runs/my run/robot.toml"
+    short = ["--seeds", "1", "--commands", "0.3", "--floor", "soft", "--no-video"]
+    assert main(["evaluate", str(file), "--robot", "legv2", *short]) == 0
+    said = capsys.readouterr().out
+    assert said.index("was trained on robot 'my-leg'") < said.index("soft floor")
+    (folder / ROBOT_FILE).unlink()
+    assert robot_of([str(file)]) == DEFAULT_ROBOT
+
+
+@pytest.mark.parametrize("verb", [["evaluate"], ["view", "--no-browser", "--seconds", "0"]])
+def test_a_robot_file_is_no_controller_and_is_said_to_be_none(verb, tmp_path, refused):
+    file = tmp_path / "my leg's.toml"
+    shutil.copy(ROOT / "examples/my_leg.toml", file)
+    refused([*verb, file], "is a robot file, no controller; give it with --robot")

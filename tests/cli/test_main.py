@@ -1,16 +1,12 @@
 import errno
 import json
 import os
-import re
-import shlex
 import signal
 import subprocess
 import sys
 import time
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Annotated
 
 import pytest
 import tyro
@@ -19,19 +15,20 @@ from hypothesis import strategies as st
 
 from hopping_leg import cli
 from hopping_leg.cli import main
-from hopping_leg.cli.options import (
-    Heights,
-    command_line,
-    going_on,
-)
+from hopping_leg.cli.options import Heights
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot, load_tree, numbers, shipped_robots
+
+
+@dataclass(frozen=True)
+class Nothing:
+    depth: int = 1
 
 
 def failing(monkeypatch, error):
     """Make `hop robots` raise."""
 
-    def run(args: Inner) -> None:
+    def run(args: Nothing) -> None:
         raise error
 
     monkeypatch.setattr(cli.importlib, "import_module", lambda _: SimpleNamespace(run=run))
@@ -47,10 +44,9 @@ def test_version_and_overview_are_said(capsys):
 
 
 def test_help_loads_nothing_heavy():
-    heavy = {"numba", "scipy", "matplotlib", "torch", "onnxruntime", "polars"}
-    quick = [verb for verb in cli.VERBS if verb not in ("demo", "deploy", "record", "export")]
+    heavy = {"numba", "scipy", "matplotlib", "torch", "onnxruntime"}
     code = "import sys, hopping_leg.cli as c; c.main([]); early = 'mujoco' in sys.modules;"
-    code += "".join(f"import hopping_leg.cli.{verb};" for verb in quick)
+    code += "".join(f"import hopping_leg.cli.{verb};" for verb in cli.VERBS if verb != "demo")
     code += f"sys.exit(early or bool({heavy} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True).returncode == 0
 
@@ -176,50 +172,6 @@ def test_urdf_is_written_to_a_file_or_printed(tmp_path, capsys):
     assert file.read_text() in capsys.readouterr().out
 
 
-@dataclass(frozen=True)
-class Inner:
-    depth: int = 1
-
-
-@dataclass(frozen=True)
-class Options:
-    names: tyro.conf.Positional[tuple[str, ...]] = ("a",)
-    heights: Heights | None = None
-    some_numbers: tuple[int, ...] = (1, 2)
-    video: bool = True
-    loud: bool = False
-    inner: Annotated[Inner, tyro.conf.arg(name="")] = field(default_factory=Inner)
-    file: Path | None = None
-    out: Path = Path("here")
-
-
-words = st.text(st.characters(categories=("L", "N")) | st.sampled_from(" '*_."), min_size=1)
-
-
-@given(
-    st.builds(
-        Options,
-        names=st.tuples(words, words) | st.just(("a",)),
-        heights=st.none()
-        | st.lists(st.integers(1, 99).map(lambda cm: cm / 100), min_size=1).map(tuple),
-        some_numbers=st.lists(st.integers(0, 9), min_size=1).map(tuple),
-        video=st.booleans(),
-        loud=st.booleans(),
-        inner=st.builds(Inner, st.integers(0, 9)),
-        file=st.none() | words.filter(lambda word: word == str(Path(word))).map(Path),
-    )
-)
-def test_tyro_reads_the_command_back(options):
-    verb, *rest = shlex.split(command_line("hop", options))
-    assert verb == "hop"
-    assert tyro.cli(Options, args=rest) == options
-
-
-def test_defaults_and_what_changes_no_number_are_left_out():
-    assert command_line("hop", Options(out=Path("there"))) == "hop"
-    assert command_line("hop", Options(out=Path("there")), ()) == "hop --out there"
-
-
 def hop(words, folder, **environment):
     """Run `hop` in a process of its own, in a folder that is its temporary one, too."""
     return subprocess.run(
@@ -251,23 +203,13 @@ def test_mujoco_writes_no_log_into_the_users_folder(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("words", [["export", "policy", "fast"], ["robots", "list"]])
-def test_a_result_that_cannot_be_written_is_still_printed(capsys, words):
-    assert main([*words, "--json", "/dev/full"]) == 2
-    captured = capsys.readouterr()
-    assert "No space left" in captured.err
-    assert json.loads(captured.out[re.search(r"^[\[{]$", captured.out, re.M).start() :])
-
-
-def test_sigterm_ends_a_verb_as_ctrl_c_does_and_says_how_to_go_on(monkeypatch, capsys):
-    def run(args: Inner) -> None:
-        with going_on("the same command goes on."):
-            os.kill(os.getpid(), signal.SIGTERM)
-            time.sleep(10)
+def test_sigterm_ends_a_verb_as_ctrl_c_does(monkeypatch):
+    def run(args: Nothing) -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(10)
 
     monkeypatch.setattr(cli.importlib, "import_module", lambda _: SimpleNamespace(run=run))
     assert main(["robots"]) == cli.INTERRUPTED
-    assert "Stopped; the same command goes on." in capsys.readouterr().err
 
 
 @given(st.text() | st.binary().map(lambda data: data.decode(errors="surrogateescape")))

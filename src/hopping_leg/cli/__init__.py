@@ -12,10 +12,12 @@ import inspect
 import io
 import os
 import re
+import shlex
 import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from contextvars import ContextVar
 from importlib.metadata import version
 from typing import Any, get_type_hints
 
@@ -32,7 +34,7 @@ VERBS = {
     "identify": "fit a leg to recordings and write its robot file",
     "deploy": "run a controller on the real leg, or on emulated drives",
     "emulate": "stand in for the real leg: two drives behind a real wire",
-    "doctor": "say what is missing here; check, configure and home a leg's drives",
+    "doctor": "check, configure and home a leg's drives; compile what is compiled",
     "view": "watch the leg in the browser: live, a trace, or the real one",
     "report": "draw what stored traces show",
     "export": "write a leg as URDF, a policy as ONNX, traces as MCAP",
@@ -42,6 +44,9 @@ VERBS = {
 
 DEMO = ("universal", "energy-shaping")
 """What `hop view` shows as `hop demo`: the policy for any leg, and the classical controller."""
+
+COMMAND = ContextVar("COMMAND", default="hop")
+"""The command that runs, as the shell reads it, for what is stored."""
 
 _CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
 _LIST = re.compile(r"[\w.+-]+(,[\w.+-]+)+")
@@ -107,11 +112,9 @@ def _dispatch(words: list[str]) -> int:
         return 0
     if verb not in VERBS:
         raise UsageError(unknown_name("verb", verb, VERBS) + " Try `hop --help`.")
-    from hopping_leg.terminal import said_if_slow
-
+    COMMAND.set(shlex.join(["hop", *words]))
     own, rest = ("view", [*DEMO, *rest]) if verb == "demo" else (verb, rest)
-    with said_if_slow(f"Loading hop {verb}."):
-        module = importlib.import_module(f"hopping_leg.cli.{own}")
+    module = importlib.import_module(f"hopping_leg.cli.{own}")
     kind = get_type_hints(module.run, include_extras=True)["args"]
     module.run(read_options(kind, f"hop {verb}", inspect.getdoc(module), rest))
     return 0

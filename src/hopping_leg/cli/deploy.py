@@ -17,16 +17,18 @@ Examples:
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import tyro
 
 from hopping_leg.cli import motors, options
-from hopping_leg.controllers import command_schedule, fallback, policy, protocol, registry
-from hopping_leg.deploy import hardware_trials, keyboard, safety_limits, stop_reasons
-from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
+from hopping_leg.deploy import safety_limits, stop_reasons
 from hopping_leg.errors import HardwareError, PolicyError, TraceError, UsageError
-from hopping_leg.robot import Robot, SoftLimits, load_robot
-from hopping_leg.sim import CONTROL_RATE, SoftLimiter
+from hopping_leg.robot import CONTROL_RATE, Robot, SoftLimits, load_robot
+
+if TYPE_CHECKING:
+    from hopping_leg.controllers import command_schedule, protocol
+    from hopping_leg.deploy import hardware_trials, keyboard
 
 _SECONDS = 10.0
 _MOST_SHARE = 0.5  # Of a control period that a policy may take
@@ -61,7 +63,9 @@ class Deploy:
 
 def run(args: Deploy) -> None:
     """Check everything, ask, run, record."""
-    robot = load_robot(args.robot or registry.robot_of([args.controller]))
+    from hopping_leg.controllers.registry import robot_of
+
+    robot = load_robot(args.robot or robot_of([args.controller]))
     robot.require_leg()
     done = _perform(args, robot, *_plan(args, robot))
     cause = done.outcome.supervisor.stop_cause
@@ -77,7 +81,6 @@ def run(args: Deploy) -> None:
         f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out.",
     )
     options.say_written(done.path)
-    options.say_next(["hop", "report", done.path])
     if cause.reason not in (stop_reasons.Reason.FINISHED, stop_reasons.Reason.OPERATOR_STOP):
         errors = [event.get("controller_error", "") for event in events]
         words = [f"The leg was stopped: {cause}", *errors, done.complaint]
@@ -88,8 +91,11 @@ def run(args: Deploy) -> None:
 
 def _plan(
     args: Deploy, robot: Robot
-) -> tuple[protocol.Controller, command_schedule.CommandSchedule, float]:
-    """Return controller, schedule and seconds; whatever is wrong with them is found here."""
+) -> "tuple[protocol.Controller, command_schedule.CommandSchedule | keyboard.LiveHeight, float]":
+    """Return controller, heights and seconds; whatever is wrong with them is found here."""
+    from hopping_leg.controllers import command_schedule, policy, registry
+    from hopping_leg.deploy import keyboard
+
     if args.schedule is not None and args.command is not None:
         raise UsageError("--command and --schedule exclude each other; give one of them.")
     controller = registry.load_controller(
@@ -111,31 +117,31 @@ def _plan(
     seconds = args.seconds or (_SECONDS if args.schedule is None else schedule.seconds)
     if not 0 < seconds <= 3600:
         raise UsageError(f"--seconds is {seconds:g} but must lie between 0 and 3600.")
-    return controller, schedule, seconds
+    heights = keyboard.LiveHeight(schedule.at(0.0), valid) if args.live else schedule
+    return controller, heights, seconds
 
 
 def _perform(
     args: Deploy,
     robot: Robot,
-    controller: protocol.Controller,
-    schedule: command_schedule.CommandSchedule,
+    controller: "protocol.Controller",
+    heights: "command_schedule.CommandSchedule | keyboard.LiveHeight",
     seconds: float,
-) -> hardware_trials.Performance:
-    height = None
-    if args.live:
-        height = keyboard.LiveHeight(
-            schedule.at(0.0), command_schedule.command_range(controller, robot)
-        )
-    limiter = SoftLimiter(robot, SoftLimits()) if args.soft_limits else None
-    sequence = MotionSequence(
-        fallback.with_fallback(controller, robot),
-        height or schedule,
-        hopping_poses(robot),
-        limiter,
-        SequenceTiming(hop=seconds),
+) -> "hardware_trials.Performance":
+    from hopping_leg.controllers.fallback import with_fallback
+    from hopping_leg.deploy import hardware_trials, keyboard, motion_sequence
+    from hopping_leg.sim import SoftLimiter
+
+    sequence = motion_sequence.MotionSequence(
+        with_fallback(controller, robot),
+        heights,
+        motion_sequence.hopping_poses(robot),
+        SoftLimiter(robot, SoftLimits()) if args.soft_limits else None,
+        motion_sequence.SequenceTiming(hop=seconds),
         checked=robot,
     )
     limits = safety_limits.hopping_limits(robot, CONTROL_RATE)
+    height = heights if isinstance(heights, keyboard.LiveHeight) else None
     with motors.connect(robot, args.transport) as link:
         drives, name = motors.check(link, robot, limits), controller.name
         motors.ask(

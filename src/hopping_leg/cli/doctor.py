@@ -1,18 +1,15 @@
 """Check the drives of a leg without moving it; write their configuration, tell them where they are.
 
-Without a transport it says which extras of the package are missing, and the command for each, and
-compiles what is compiled, so that nothing waits for it later.
+Without a transport it compiles what is compiled, so that nothing waits for it later.
 
 Examples:
-  hop doctor                                               # what is installed, what is not
+  hop doctor                                               # compiles
   hop doctor --transport /dev/fdcanusb --robot legv2
   hop doctor --transport /dev/fdcanusb --robot my_leg.toml --write
   hop doctor --transport socketcan:can0 --home 0.0 0.0     # the leg hangs straight down
 """
 
-import re
 from dataclasses import dataclass
-from importlib.metadata import distributions, requires
 from typing import TYPE_CHECKING
 
 from hopping_leg.cli import motors, options
@@ -23,24 +20,14 @@ from hopping_leg.robot import CONTROL_RATE, DEFAULT_ROBOT, JOINTS, Robot, load_r
 if TYPE_CHECKING:
     from hopping_leg.deploy.moteus_link import MoteusLink
 
-PURPOSES = {
-    "train": "train policies (hop train)",
-    "view": "watch the leg in the browser (hop view)",
-    "hardware": "talk to the drives (hop deploy, hop doctor, hop emulate)",
-    "ros": "MCAP files and ROS 2 bags (hop export traces, hop identify)",
-    "cluster": "identify or train on a Ray cluster (--ray)",
-    "docs": "build the documentation (make docs)",
-    "dev": "test and check a clone (make test, make check)",
-}
-
 
 @dataclass(frozen=True)
 class Doctor:
     """Which drives, and what may be changed."""
 
     transport: str | None = None
-    """Path of an fdcanusb, or interface:channel of python-can; without one the installation is
-    checked."""
+    """Path of an fdcanusb, or interface:channel of python-can; without one code is
+    compiled."""
     robot: str = DEFAULT_ROBOT
     """A shipped robot or a .toml file; its table [hardware] says how the drives are wired."""
     write: bool = False
@@ -57,18 +44,7 @@ def run(args: Doctor) -> None:
     if args.transport is None:
         if changes:
             raise UsageError("--write and --home need the drives; name their --transport.")
-        for extra, purpose in PURPOSES.items():
-            missing = missing_packages(extra)
-            state = f"missing {', '.join(missing)}" if missing else "installed"
-            options.say(f"{extra}: {state}; {purpose}")
-            if missing:
-                options.say(f"  pip install 'hopping-leg[{extra}]'")
-        from hopping_leg.sim.compiled import FOLDER
-
         compile_everything()
-        options.say(
-            f"compiled code: {FOLDER or 'no folder can be written; lost with each process'}"
-        )
         return
     robot = load_robot(args.robot)
     limits = safety_limits.hopping_limits(robot, CONTROL_RATE)
@@ -92,21 +68,20 @@ def run(args: Doctor) -> None:
 
 
 def compile_everything() -> None:
-    """Compile what simulation, environment and identification need, or load it."""
+    """Compile what simulation, environment and identification need, or load it; say where it is."""
     import numpy as np
 
     from hopping_leg.envs import HoppingEnv
     from hopping_leg.identify.simulate import compile_replay
     from hopping_leg.sim import compile_physics
-    from hopping_leg.sim.mujoco_simulator import MujocoSimulator
+    from hopping_leg.sim.compiled import FOLDER
 
-    robot = load_robot(DEFAULT_ROBOT)
     compile_physics()
     compile_replay()
-    env = HoppingEnv(robot)
+    env = HoppingEnv(load_robot(DEFAULT_ROBOT))
     env.reset(seed=0)
     env.step(np.zeros(2, np.float32))
-    MujocoSimulator(robot, 1).step(np.zeros((1, 2)))
+    options.say(f"compiled code: {FOLDER or 'no folder can be written; lost with each process'}")
 
 
 def _write(
@@ -121,10 +96,3 @@ def _write(
             options.say(*(f"{name}: {s.name} = {s.text} ({s.why})" for s in settings))
             motors.ask(f"These settings of the {name}'s drive will be written for good.", yes=yes)
             configure(link, joint, settings)
-
-
-def missing_packages(extra: str) -> list[str]:
-    """Return what an extra brings and is not installed."""
-    asked = [r for r in requires("hopping-leg") or () if r.endswith(f"extra == '{extra}'")]
-    names = [re.split(r"[^\w.-]", requirement)[0] for requirement in asked]
-    return [name for name in names if not any(distributions(name=name))]

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hopping_leg.cli.options import at_least, say, say_next, show_table
+from hopping_leg.cli.options import at_least, say, show_table
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode
 from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
 from hopping_leg.emulator.faults import KINDS, load_faults
@@ -90,7 +90,6 @@ def run(args: Emulate) -> None:
     with contextlib.closing(port), contextlib.suppress(KeyboardInterrupt):
         ids = " and ".join(str(drive.id) for drive in robot.drives)
         say(f"Drives {ids} of {robot.robot.name} behind {port}")
-        say_next(_deployment(args.robot, str(port)))
         sys.stdout.flush()
         if args.realtime and prefer_this_thread() is not None:
             say("Without real-time priority the drives may answer late under load.")
@@ -99,15 +98,6 @@ def run(args: Emulate) -> None:
         with uninterrupted():
             server.run(lambda: robot.time >= seconds)
     say(f"The emulator ended after {robot.time:.1f} s.")
-
-
-def _deployment(robot: str, port: str) -> list[str]:
-    """Return the command that drives the leg, with a policy that is made for it, if any is."""
-    from hopping_leg.controllers.registry import ENERGY_SHAPING, robot_of, shipped_policies
-
-    fitting = [name for name in shipped_policies() if robot_of([name]) == robot]
-    name = "fast" if "fast" in fitting else [*fitting, ENERGY_SHAPING][0]
-    return ["hop", "deploy", name, "--robot", robot, "--transport", port]
 
 
 def _kind_cells(name: str) -> tuple[str, ...]:

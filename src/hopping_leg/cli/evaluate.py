@@ -24,10 +24,10 @@ from typing import TYPE_CHECKING, Literal
 
 import tyro
 
-from hopping_leg import io, terminal
-from hopping_leg.cli import options
+from hopping_leg import io
+from hopping_leg.cli import COMMAND, options
 from hopping_leg.robot import CONTROL_RATE, TIMESTEP, SoftLimits, load_robot
-from hopping_leg.terminal import plain_console
+from hopping_leg.terminal import Progress, plain_console
 
 if TYPE_CHECKING:
     from hopping_leg.controllers import RolloutConfig
@@ -64,72 +64,73 @@ class Evaluate:
     axes: tuple[str, ...] = ()
     """Axes of the suite robustness by name; default: all."""
     out: Path | None = None
-    """Folder for evaluation.json, report.html and traces/, instead of naming each."""
-    report: Path | None = None
-    """File for the report, one self-contained HTML page."""
+    """Folder for evaluation.json, report.html (one self-contained page) and traces/."""
     traces: Path | None = None
-    """Folder for the runs as Parquet, for `hop report` and your own tools."""
+    """Another folder for the runs as Parquet, for `hop report` and your own tools."""
     floor: Literal["soft", "stiff", "both"] = "both"
     """The robot's own contact (soft), MuJoCo's default (stiff), or all trials on the first and
     the fixed ones on the second."""
     video: bool = True
     """Put a short video of each controller into the report, if OpenGL is available."""
 
-    def load(self) -> "tuple[list[Entry], RolloutConfig]":
-        """Return the controllers and how they are rolled out; a wrong option is a UsageError."""
-        from hopping_leg.controllers import RolloutConfig
-        from hopping_leg.controllers.registry import robot_of
-        from hopping_leg.evaluate.runner import load_entries
-        from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 
-        options.at_least(0, seed=self.seed)
-        robot = load_robot(self.robot or robot_of(self.controllers))
-        noise = NoiseAndDelay() if self.noise else NO_NOISE
-        setup = RolloutConfig(
-            robot, noise, SoftLimits() if self.soft_limits else None,
-            rate=self.rate, timestep=self.timestep, threads=self.threads,
-        )  # fmt: skip
-        return load_entries(self.controllers, robot, self.rate), setup
+def load(args: Evaluate) -> "tuple[list[Entry], RolloutConfig]":
+    """Return the controllers and how they are rolled out; a wrong option is a UsageError."""
+    from hopping_leg.controllers import RolloutConfig
+    from hopping_leg.controllers.registry import robot_of
+    from hopping_leg.evaluate.runner import load_entries
+    from hopping_leg.sim import NO_NOISE, NoiseAndDelay
+
+    options.at_least(0, seed=args.seed)
+    robot = load_robot(args.robot or robot_of(args.controllers))
+    noise = NoiseAndDelay() if args.noise else NO_NOISE
+    setup = RolloutConfig(
+        robot, noise, SoftLimits() if args.soft_limits else None,
+        rate=args.rate, timestep=args.timestep, threads=args.threads,
+    )  # fmt: skip
+    return load_entries(args.controllers, robot, args.rate), setup
 
 
 def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     """Evaluate controllers, print the table, write what was asked for; notes come first there."""
+    entries, setup = load(args)
+    if args.suite == "robustness":
+        _robustness(args, entries, setup)
+    else:
+        _paper(args, entries, setup, notes)
+
+
+def _paper(
+    args: Evaluate, entries: "list[Entry]", setup: "RolloutConfig", notes: Sequence[str]
+) -> None:
     from hopping_leg.evaluate import tables, trials
 
-    command = options.command_line("hop evaluate", args)
-    if args.suite == "robustness":
-        _judge_robustness(args, command)
-        return
-    if args.out is not None:
-        args = replace(
-            args,
-            json=args.json or args.out / "evaluation.json",
-            report=args.report or args.out / "report.html",
-            traces=args.traces or args.out / "traces",
-        )
-    entries, setup = args.load()
     judged = _judge(entries, setup, args)
     notes = [*notes, *judged.evaluation.notes]
-    judged = replace(judged, evaluation=replace(judged.evaluation, command=command, notes=notes))
-    tables.print_evaluation(plain_console(), judged.evaluation)
-    options.save_json(args.json, judged.evaluation.to_json())
-    if args.traces:
-        trials.save_traces(judged.runs, args.traces)
-    if args.report:
+    evaluation = replace(judged.evaluation, command=COMMAND.get(), notes=notes)
+    tables.print_evaluation(plain_console(), evaluation)
+    numbers, report, traces = args.json, None, args.traces
+    if args.out is not None:
+        numbers, traces = numbers or args.out / "evaluation.json", traces or args.out / "traces"
+        report = args.out / "report.html"
+    options.save_json(numbers, evaluation.to_json())
+    if traces:
+        trials.save_traces(judged.runs, traces)
+    if report:
         from hopping_leg.evaluate.report import write_report
         from hopping_leg.evaluate.video import render_videos
 
-        with terminal.said_if_slow("Writing the report."):
-            videos = render_videos(setup.robot, judged.runs) if args.video else None
-            io.write_atomically(args.report, write_report(judged, videos))
-    options.say_written(args.json, args.report, args.traces)
+        videos = render_videos(setup.robot, judged.runs) if args.video else None
+        page = write_report(replace(judged, evaluation=evaluation), videos)
+        io.write_atomically(report, page)
+    options.say_written(numbers, report, traces)
 
 
 def _judge(entries: "list[Entry]", setup: "RolloutConfig", args: Evaluate) -> "EvaluationRun":
     from hopping_leg.evaluate import evaluate, trials
 
     floors = ("soft", "stiff") if args.floor == "both" else (args.floor,)
-    with terminal.Progress(parts=len(entries) * len(floors)) as bar:
+    with Progress(parts=len(entries) * len(floors)) as bar:
         judged = [
             evaluate(
                 entries,
@@ -148,18 +149,16 @@ def _judge(entries: "list[Entry]", setup: "RolloutConfig", args: Evaluate) -> "E
     return replace(first, evaluation=replace(first.evaluation, secondary=secondary))
 
 
-def _judge_robustness(args: Evaluate, command: str) -> None:
+def _robustness(args: Evaluate, entries: "list[Entry]", setup: "RolloutConfig") -> None:
     """Run the suite, print the scores, write numbers and figure."""
     from hopping_leg.evaluate import figures, tables
     from hopping_leg.evaluate.robustness import make_suite, run_suite
     from hopping_leg.figures import to_svg
 
-    entries, setup = args.load()
     out, heights, seeds = args.out or Path("runs/robustness"), args.commands, args.seeds
     suite = make_suite(setup, axes=args.axes, commands=heights, repeats=seeds, seed=args.seed)
-    with terminal.Progress(parts=len(entries)) as bar:
-        found = run_suite(entries, suite, bar.show)
-    result = {"command": command, **found}
+    with Progress(parts=len(entries)) as bar:
+        result = {"command": COMMAND.get(), **run_suite(entries, suite, bar.show)}
     file, figure = args.json or out / "robustness.json", out / "robustness.svg"
     tables.print_robustness(plain_console(), result)
     options.save_json(file, result)

@@ -13,8 +13,6 @@ from pathlib import Path
 import tyro
 
 from hopping_leg.cli.options import JsonFile, RobotFile, save_json, say_written, show_table
-from hopping_leg.errors import UsageError
-from hopping_leg.flight_recording import load_trace
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import load_robot, to_urdf
 
@@ -44,7 +42,7 @@ class Traces:
     """Write traces as MCAP for Foxglove, rerun or ROS 2, a file for each."""
 
     traces: tyro.conf.Positional[tuple[Path, ...]]
-    """Parquet files of `hop evaluate --traces DIR`, `hop deploy` or `hop record`, or the .blackbox
+    """Parquet files of `hop evaluate --out DIR`, `hop deploy` or `hop record`, or the .blackbox
     of a killed run."""
     out: Path | None = None
     """Folder to write to; default: beside the traces."""
@@ -53,34 +51,25 @@ class Traces:
 def run(args: Urdf | Policy | Traces) -> None:
     """Export a leg, a policy or traces."""
     if isinstance(args, Traces):
-        _export(args)
+        from hopping_leg.flight_recording import load_trace
+        from hopping_leg.formats import to_mcap
+
+        for path in args.traces:
+            file = (args.out or path.parent) / f"{path.stem}.mcap"
+            write_atomically(file, to_mcap(load_trace(path)))
+            say_written(file)
     elif isinstance(args, Policy):
-        _show(args)
+        from hopping_leg.controllers.registry import load_policy
+
+        policy = load_policy(args.policy)
+        facts = {**asdict(policy.card), "digest": policy.digest, "inputs": policy.inputs}
+        show_table(("entry", "value"), facts.items(), f"policy {policy.name}")
+        save_json(args.json, facts)
+        if args.out:
+            write_atomically(args.out, policy.content)
+            say_written(args.out)
     elif args.out:
         write_atomically(args.out, to_urdf(load_robot(args.robot)).encode())
         say_written(args.out)
     else:
         sys.stdout.write(to_urdf(load_robot(args.robot)))
-
-
-def _export(args: Traces) -> None:
-    if not args.traces:
-        raise UsageError("No trace was named; record some with `hop evaluate ... --traces DIR`.")
-    from hopping_leg.formats import to_mcap
-
-    for path in args.traces:
-        file = (args.out or path.parent) / f"{path.stem}.mcap"
-        write_atomically(file, to_mcap(load_trace(path)))
-        say_written(file)
-
-
-def _show(args: Policy) -> None:
-    from hopping_leg.controllers.registry import load_policy
-
-    policy = load_policy(args.policy)
-    facts = {**asdict(policy.card), "digest": policy.digest, "inputs": policy.inputs}
-    show_table(("entry", "value"), facts.items(), f"policy {policy.name}")
-    save_json(args.json, facts)
-    if args.out:
-        write_atomically(args.out, policy.content)
-        say_written(args.out)

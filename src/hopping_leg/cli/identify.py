@@ -19,17 +19,10 @@ from typing import TYPE_CHECKING
 import tyro
 
 from hopping_leg import errors, io
-from hopping_leg.cli.options import (
-    JsonFile,
-    command_line,
-    save_json,
-    say,
-    say_next,
-    say_written,
-    show_table,
-)
+from hopping_leg.cli import COMMAND
+from hopping_leg.cli.options import JsonFile, save_json, say, say_written, show_table
 from hopping_leg.robot import JOINTS, load_robot
-from hopping_leg.terminal import Progress, said_if_slow
+from hopping_leg.terminal import Progress
 
 if TYPE_CHECKING:
     from hopping_leg.identify.result import Identified
@@ -114,23 +107,17 @@ def run(args: Identify) -> None:
             report=lambda stage, share, cost: bar.show(stage, share, f"cost {cost:.5g}"),
         )
     result.save_robot(identified, args.out, origin)
-    command = command_line("hop identify", args, ("threads", "ray"))
     if warning := result.warning(identified):
         say(warning)
     _show(identified)
-    with said_if_slow("Drawing what the recordings allow."):
-        numbers = result.as_json(identified, args.posterior)
-    save_json(args.json, {"command": command, **numbers})
+    numbers = result.as_json(identified, args.posterior)
+    save_json(args.json, {"command": COMMAND.get(), **numbers})
     if args.report:
-        with said_if_slow("Writing the report."):
-            io.write_atomically(args.report, write_fit_report(identified, command, args.threads))
+        page = write_fit_report(identified, COMMAND.get(), args.threads)
+        io.write_atomically(args.report, page)
     say_written(args.out, args.json, args.report)
     if warning:
         raise errors.PhysicsError(warning)
-    say_next(
-        ["hop", "robots", "check", args.out],
-        ["hop", "train", "--robot", args.out, "--out", f"runs/{args.out.stem}"],
-    )
 
 
 def _bounds(text: str) -> tuple[str, tuple[float, float]]:

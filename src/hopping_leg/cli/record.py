@@ -15,22 +15,21 @@ Examples:
   hop record play fixed-base.parquet --robot my_leg.toml --transport /dev/fdcanusb
 """
 
+import contextlib
+from collections.abc import Generator
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import tyro
 
-from hopping_leg.cli import motors, options
-from hopping_leg.cli.options import RobotFile, say, say_next, show_table
-from hopping_leg.controllers import command_schedule, joint_pd
-from hopping_leg.deploy import hardware_trials, keyboard, safety_limits, stop_reasons
-from hopping_leg.deploy.motion_sequence import MotionSequence, Poses, SequenceTiming, hopping_poses
+from hopping_leg.cli import motors
+from hopping_leg.cli.options import RobotFile, at_least, say, say_written, show_table
+from hopping_leg.deploy import safety_limits, stop_reasons
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.identify import paper_excitation as paper
-from hopping_leg.identify import play_excitation, recording_format
 from hopping_leg.identify.excitation import (
     RATE,
     Excitation,
@@ -41,8 +40,13 @@ from hopping_leg.identify.excitation import (
     load_excitation,
     make_excitation,
 )
+from hopping_leg.identify.recording_format import Pair
 from hopping_leg.robot import TIMESTEP, Robot, load_robot, parent_robot
 from hopping_leg.terminal import Progress
+
+if TYPE_CHECKING:
+    from hopping_leg.controllers.joint_pd import JointGains
+    from hopping_leg.identify.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -56,9 +60,9 @@ class Common:
     """Targets per second, Hz."""
     track_velocity: bool = False
     """Velocity targets are the positions' derivative, as in the lab's recordings, not zero."""
-    hip_range: recording_format.Pair = HardwareRange().hip
+    hip_range: Pair = HardwareRange().hip
     """Range of the real hip, rad."""
-    knee_range: recording_format.Pair = HardwareRange().knee
+    knee_range: Pair = HardwareRange().knee
     """Range of the real knee, rad."""
 
 
@@ -114,10 +118,10 @@ class Play:
     that --robot extends, or --robot itself if it extends none or the motors are real."""
     seed: int = 0
     """Seed of jitter and sensor noise."""
-    stiffness: recording_format.Pair = joint_pd.JointGains().stiffness
-    """Stiffness of the joint PD, hip and knee, N m/rad."""
-    damping: recording_format.Pair = joint_pd.JointGains().damping
-    """Damping of the joint PD, hip and knee, N m s/rad."""
+    stiffness: Pair | None = None
+    """Stiffness of the joint PD, hip and knee, N m/rad; default: fits leg V2."""
+    damping: Pair | None = None
+    """Damping of the joint PD, hip and knee, N m s/rad; default: fits leg V2."""
     timestep: float = TIMESTEP
     """Physics step, s."""
 
@@ -171,70 +175,79 @@ def _write(args: MovingBase | MultisineCommand) -> None:
         f"{args.out}: {len(excitation)} targets for {robot.name}",
     )
     say(*excitation.description.split("; "))
-    say_next(["hop", "record", "play", args.out, "--robot", args.robot])
 
 
 def _play(args: Play) -> None:
     """Play every excitation and write its recording."""
+    from hopping_leg.controllers.joint_pd import JointGains
+
     if not args.excitations:
         raise UsageError("No excitation was given; write one with `hop record fixed-base`.")
-    options.at_least(0, seed=args.seed)
+    at_least(0, seed=args.seed)
     name = args.robot or ("twin" if args.transport is None else "legv2")
     robot = load_robot(name)
     parent = parent_robot(name) if args.transport is None else None
     believed = args.believed or parent or name
     load_robot(believed)
-    gains = joint_pd.JointGains(args.stiffness, args.damping)
-    loaded = [(path.stem, load_excitation(path)) for path in args.excitations]
-    names = [name for name, _ in loaded]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise UsageError(
-            f"Two excitations are called '{twice[0]}' and would share a recording; rename one."
-        )
-    if args.transport is not None:
-        _record_motors(args, args.transport, robot, loaded, believed, gains)
-        return
-    files = []
-    with Progress(parts=len(loaded)) as bar:
-
-        def tell(stem: str, done: int, ticks: int) -> None:
-            bar.show(stem, done / ticks)
-
-        for number, (stem, excitation) in enumerate(loaded):
-            recording = play_excitation.play(
-                excitation,
-                robot,
-                believed=believed,
-                seed=args.seed + number,
-                gains=gains,
-                timestep=args.timestep,
-                on_tick=partial(tell, stem),
-            )
+    own = {"stiffness": args.stiffness, "damping": args.damping}
+    gains = JointGains(**{key: pair for key, pair in own.items() if pair is not None})
+    loaded = {path.stem: load_excitation(path) for path in args.excitations}
+    if len(loaded) < len(args.excitations):
+        raise UsageError("Excitations share a name and would share a recording; rename one.")
+    record = _simulated if args.transport is None else _measured
+    with contextlib.closing(record(args, robot, loaded, believed, gains)) as recordings:
+        for stem, recording in recordings:
             file = args.out / f"{robot.name}-{stem}.parquet"
             recording.save(file)
-            files.append(file)
-            options.say_written(file)
-            options.say(*(f"  {warning}" for warning in recording.warnings))
-    options.say_next(["hop", "identify", *files, "--robot", believed])
+            say_written(file)
+            say(*(f"  {warning}" for warning in recording.warnings))
 
 
-def _record_motors(
+def _simulated(
     args: Play,
-    transport: str,
     robot: Robot,
-    excitations: list[tuple[str, Excitation]],
+    excitations: dict[str, Excitation],
     believed: str,
-    gains: joint_pd.JointGains,
-) -> None:
-    rates = {excitation.rate for _, excitation in excitations}
+    gains: "JointGains",
+) -> "Generator[tuple[str, Recording]]":
+    from hopping_leg.identify.play_excitation import play
+
+    with Progress(parts=len(excitations)) as bar:
+        for number, (stem, excitation) in enumerate(excitations.items()):
+            yield (
+                stem,
+                play(
+                    excitation,
+                    robot,
+                    believed=believed,
+                    seed=args.seed + number,
+                    gains=gains,
+                    timestep=args.timestep,
+                    on_tick=partial(lambda stem, done, ticks: bar.show(stem, done / ticks), stem),
+                ),
+            )
+
+
+def _measured(
+    args: Play,
+    robot: Robot,
+    excitations: dict[str, Excitation],
+    believed: str,
+    gains: "JointGains",
+) -> "Generator[tuple[str, Recording]]":
+    """Record motors; refuse a run that did not end by itself."""
+    from hopping_leg.controllers import command_schedule, joint_pd
+    from hopping_leg.deploy import hardware_trials, keyboard, motion_sequence
+    from hopping_leg.identify.play_excitation import recording_of
+
+    transport, rates = str(args.transport), {e.rate for e in excitations.values()}
     if len(rates) > 1:
         raise UsageError("The excitations have different rates; record them one by one.")
     rate = rates.pop()
     limits = safety_limits.recording_limits(robot, rate)
     with motors.connect(robot, transport) as link:
         drives = motors.check(link, robot, limits)
-        for name, excitation in excitations:
+        for name, excitation in excitations.items():
             seconds = len(excitation) / rate
             motors.ask(
                 f"{robot.name} on the {excitation.rig} will play {name} for {seconds:.0f} s; keep a"
@@ -242,34 +255,34 @@ def _record_motors(
                 yes=args.yes,
             )
             controller = joint_pd.JointPD(excitation.position, excitation.velocity, gains)
+            fixed, poses = excitation.rig == "fixed-base", motion_sequence.hopping_poses(robot)
+            sequence = motion_sequence.MotionSequence(
+                controller,
+                command_schedule.CommandSchedule(((float("nan"), 1.0),)),
+                motion_sequence.Poses(excitation.position[0], np.zeros(2) if fixed else poses.rest),
+                None,
+                motion_sequence.SequenceTiming(hop=seconds),
+                gains,
+            )
             header = hardware_trials.header_of(
                 robot, controller, rate, transport=transport, drives=drives
             )
-            rest = np.zeros(2) if excitation.rig == "fixed-base" else hopping_poses(robot).rest
             done = hardware_trials.perform(
                 link,
-                MotionSequence(
-                    controller,
-                    command_schedule.CommandSchedule(((float("nan"), 1.0),)),
-                    Poses(excitation.position[0], rest),
-                    None,
-                    SequenceTiming(hop=seconds),
-                    gains,
-                ),
+                sequence,
                 limits,
                 hardware_trials.new_path(args.out / "traces", name),
                 header,
-                beside=lambda loop: keyboard.keys(None, loop.stop, options.say),
+                beside=lambda loop: keyboard.keys(None, loop.stop, say),
             )
+            say(*done.notices)
             cause = done.outcome.supervisor.stop_cause
             if cause.reason is not stop_reasons.Reason.FINISHED or done.complaint:
                 raise HardwareError(
                     f"{name} was stopped: {cause} {done.complaint} Its trace is {done.path}."
                 )
-            file = args.out / f"{robot.name}-{name}.parquet"
-            recording = play_excitation.recording_of(
-                done.trace, excitation, believed=believed, gains=gains, name=file.name
+            file = f"{robot.name}-{name}.parquet"
+            yield (
+                name,
+                recording_of(done.trace, excitation, believed=believed, gains=gains, name=file),
             )
-            recording.save(file)
-            options.say(*(f"  {notice}" for notice in (*done.notices, *recording.warnings)))
-            options.say_written(file)

@@ -13,7 +13,6 @@ import tyro
 
 from hopping_leg import errors, io
 from hopping_leg.cli.options import say
-from hopping_leg.terminal import said_if_slow
 
 
 @dataclass(frozen=True)
@@ -21,7 +20,7 @@ class Report:
     """Draw the figures of stored traces."""
 
     traces: tyro.conf.Positional[tuple[Path, ...]]
-    """Parquet files from `hop evaluate --traces DIR` or `hop deploy`; also the .blackbox that a
+    """Parquet files from `hop evaluate --out DIR` or `hop deploy`; also the .blackbox that a
     killed `hop deploy` leaves, whose trace is then written beside it."""
     out: Path = Path("figures")
     """Folder for the figures."""
@@ -32,20 +31,17 @@ class Report:
 def run(args: Report) -> None:
     """Draw figures."""
     if not args.traces:
-        raise errors.UsageError(
-            "No trace was named; record some with `hop evaluate ... --traces DIR`."
-        )
-    with said_if_slow("Reading and drawing."):
-        from hopping_leg import flight_recording
-        from hopping_leg.evaluate import report, result, trials
-        from hopping_leg.figures import encode
+        raise errors.UsageError("No trace was named; record some with `hop evaluate --out DIR`.")
+    from hopping_leg import flight_recording
+    from hopping_leg.evaluate import report, result, trials
+    from hopping_leg.figures import encode
 
-        for path in args.traces:
-            if path.suffix == flight_recording.SUFFIX:
-                flight_recording.recover(path).save(path.with_suffix(".parquet"))
-        runs = [trials.load_run(path) for path in args.traces]
-        controllers = list(dict.fromkeys(run.controller for run in runs))
-        for picture in report.draw_report_figures(result.tabulate(runs, controllers, seed=0), runs):
-            path = args.out / f"{picture.name}.{args.format}"
-            io.write_atomically(path, encode(picture.figure, args.format))
-            say(f"{picture.title}: {path}")
+    for path in args.traces:
+        if path.suffix == flight_recording.SUFFIX:
+            flight_recording.recover(path).save(path.with_suffix(".parquet"))
+    runs = [trials.load_run(path) for path in args.traces]
+    controllers = list(dict.fromkeys(run.controller for run in runs))
+    for picture in report.draw_report_figures(result.tabulate(runs, controllers, seed=0), runs):
+        path = args.out / f"{picture.name}.{args.format}"
+        io.write_atomically(path, encode(picture.figure, args.format))
+        say(f"{picture.title}: {path}")

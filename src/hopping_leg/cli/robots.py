@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from hopping_leg.cli.options import at_least, save_json, say, say_next, show_table
+from hopping_leg.cli.options import at_least, save_json, say, show_table
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import Robot, build_model, importing, numbers, robot_files
@@ -157,11 +157,6 @@ def _import(args: Import) -> None:
         show_table(("number", "value", "unit", "because"), rows, title)
     say(f"Wrote {out}: {robot.name} ({_summary(robot)}).")
     say(*(f"But {doubt}" for doubt in robot_files.doubts(out)))
-    say_next(
-        ["hop", "robots", "check", out],
-        ["hop", "view", "universal", "--robot", out],
-        ["hop", "evaluate", "universal", "energy-shaping", "--robot", out],
-    )
 
 
 def derived(robot: Robot) -> dict[str, Any]:

@@ -12,13 +12,14 @@ Examples:
   hop evaluate runs/mine/policy.onnx
 """
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from hopping_leg.cli.options import JsonFile, at_least, going_on, save_json, say_next
+from hopping_leg.cli.options import JsonFile, at_least, save_json, say
+from hopping_leg.errors import TraceError
 from hopping_leg.robot import load_robot
-from hopping_leg.terminal import said_if_slow
 
 
 @dataclass(frozen=True)
@@ -65,10 +66,9 @@ class Options:
 
 def run(args: Options) -> None:
     """Train a controller."""
-    with said_if_slow("Loading torch."):
-        from hopping_leg.rl.recipes import change, get_recipe, randomise
-        from hopping_leg.rl.run_folder import read_result
-        from hopping_leg.rl.train import train
+    from hopping_leg.rl.recipes import change, get_recipe, randomise
+    from hopping_leg.rl.run_folder import read_result
+    from hopping_leg.rl.train import train
 
     recipe = get_recipe(args.recipe)
     at_least(0, seed=args.seed)
@@ -82,7 +82,7 @@ def run(args: Options) -> None:
         recipe = recipe.replace({"task.observation": args.observation})
     recipe = recipe.replace(heights=args.heights)
     out = args.out or Path("runs") / f"{recipe.name}-seed{args.seed}"
-    with going_on(f"the same command with --resume goes on in {out}."):
+    try:
         trained = train(
             recipe,
             load_robot(args.robot or recipe.robot),
@@ -94,11 +94,9 @@ def run(args: Options) -> None:
             threads=args.threads,
             ray=args.ray,
         )
-    print(trained.policy.with_name("model_card.md").read_text(encoding="utf-8"))
-    print(f"Policy: {trained.policy}")
-    on_robot = [] if args.robot is None else ["--robot", args.robot]
-    say_next(
-        ["hop", "evaluate", trained.policy, *on_robot, "--out", out / "evaluation"],
-        ["hop", "view", trained.policy, *on_robot],
-    )
+    except (KeyboardInterrupt, OSError, TraceError):
+        print(f"Stopped; the same command with --resume goes on in {out}.", file=sys.stderr)
+        raise
+    say(trained.policy.with_name("model_card.md").read_text(encoding="utf-8"))
+    say(f"Policy: {trained.policy}")
     save_json(args.json, read_result(trained.policy.parent))
