@@ -48,29 +48,6 @@ def assert_same_motion(robot, other, rng, rtol=1e-9):
         np.testing.assert_allclose(other.of_joints(name), expected, rtol=rtol, atol=1e-9)
 
 
-@settings(max_examples=25, deadline=None)
-@given(SEEDS)
-def test_a_drawn_leg_comes_back_from_its_urdf(tmp_path_factory, seed):
-    rng = np.random.default_rng(seed)
-    robot = random_robot(rng)
-    numbers = {
-        f"{name}.{path}": value
-        for name in JOINTS
-        for path, value in {
-            "belt_ratio": getattr(robot, name).belt_ratio,
-            "armature": getattr(robot, name).armature,
-            "motor.gear_ratio": getattr(robot, name).motor.gear_ratio,
-            "motor.rotor_inertia": getattr(robot, name).motor.rotor_inertia,
-        }.items()
-    }
-    path = tmp_path_factory.mktemp("leg") / "leg.urdf"
-    other = imported(path, to_urdf(robot), (), numbers)  # URDF does not know them
-    assert_same_motion(robot, other, rng)
-    for name in ("torque_limit", "no_load_speed", "armature"):
-        np.testing.assert_allclose(other.of_joints(name), robot.of_joints(name), rtol=1e-9)
-    assert (other.rail, other.foot) == (robot.rail, robot.foot)
-
-
 def drawn_urdf(robot, rng):
     """Return a URDF whose joints' signs and zeros, plane and offsets beside it are drawn."""
     yaw, zeros = rng.uniform(-np.pi, np.pi), (rng.uniform(-2, 2), rng.uniform(-2.5, -0.2))
@@ -131,17 +108,19 @@ def test_it_comes_back_whatever_signs_zeros_and_plane_a_file_has(tmp_path_factor
     assert_same_motion(dataclasses.replace(robot, **motors), other, rng)
 
 
+@pytest.mark.parametrize("form", ["urdf", "mjcf"])
 @pytest.mark.parametrize("name", [name for name in shipped_robots() if name.startswith("leg")])
-def test_a_leg_comes_back_from_mjcf(tmp_path, name):
-    robot = load_robot(name)
-    spec = get_spec(robot)
+def test_a_leg_comes_back_from_what_is_exported_of_it(tmp_path, name, form):
+    robot, spec = load_robot(name), get_spec(load_robot(name))
     spec.compile()
-    other = imported(tmp_path / "leg.xml", spec.to_xml())
-    assert_same_motion(
-        robot, other, np.random.default_rng(0), rtol=1e-4
-    )  # MuJoCo writes six digits
+    armatures = {f"{joint}.armature": getattr(robot, joint).armature for joint in JOINTS}
+    if form == "urdf":  # URDF does not know them
+        other = imported(tmp_path / "leg.urdf", to_urdf(robot), values=armatures)
+    else:
+        other = imported(tmp_path / "leg.xml", spec.to_xml())  # MuJoCo writes six digits
+    assert_same_motion(robot, other, np.random.default_rng(0), rtol=1e-4)
     np.testing.assert_allclose(other.of_joints("armature"), robot.of_joints("armature"), rtol=1e-4)
-    assert other.foot == robot.foot
+    assert (other.rail, other.foot) == (robot.rail, robot.foot)
 
 
 def test_mjcf_is_read_with_defaults_degrees_and_without_its_meshes(tmp_path):

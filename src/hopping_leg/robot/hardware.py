@@ -5,19 +5,12 @@ left out; the defaults are leg V2's: mjbots qdd100 at 24 V, hip 1, knee 2.
 """
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from hopping_leg.io import quantity
 
 REGISTER_MAP = 5
 """Version of the drives' register map that this package speaks (register 0x102)."""
-
-WATCHDOG = (0.002, 0.1, "the drives' own default is 0.1 s (servo.default_timeout_s)")
-TEMPERATURE = (20.0, 75.0, "the drives trip at 75 deg C (servo.fault_temperature)")
-VOLTAGE = (10.0, 46.0, "moteus drives work from 10 V and trip at 46 V (servo.max_voltage)")
-CURRENT = (0.0, 100.0, "a moteus r4 gives 100 A at most")
-"""Bounds that no robot file can move, each with its source: beyond them a limit guards nothing."""
 
 
 @dataclass(frozen=True)
@@ -78,40 +71,6 @@ class Hardware:
         return self.hip, self.knee
 
 
-def speed_constant(servo: Servo) -> float:
-    """Return the rotor's speed per volt, rad/(s V), by moteus' formula for the torque constant."""
-    return torque_constant(servo.torque_constant)
-
-
 def torque_constant(speed_constant: float) -> float:
     """Return the torque constant, N m/A, for a speed constant, rad/(s V), or the other way."""
     return 1.5 / math.sqrt(3) / speed_constant
-
-
-def contradictions(hardware: Hardware) -> Iterator[str]:
-    """Yield sentences about fields that contradict each other."""
-    for name, servo in (("hip", hardware.hip), ("knee", hardware.knee)):
-        at = f"'hardware.{name}"
-        if servo.id not in range(1, 127):
-            yield f"{at}.id' is {servo.id:g} but must be a whole number, 1 to 126."
-        if abs(servo.sign) != 1:
-            yield f"{at}.sign' is {servo.sign:g} but must be 1 or -1."
-    if hardware.hip.id == hardware.knee.id:
-        yield f"'hardware.hip.id' and 'hardware.knee.id' are both {hardware.hip.id:g}."
-    low, high = hardware.voltage_low, hardware.voltage_high
-    if low >= high:
-        at = "'hardware.voltage"
-        yield f"{at}_low' ({low:g} V) must lie below {at}_high' ({high:g})."
-    for path, value, unit, least, most, source in (
-        ("watchdog", hardware.watchdog, "s", *WATCHDOG),
-        ("temperature_limit", hardware.temperature_limit, "deg C", *TEMPERATURE),
-        ("voltage_low", hardware.voltage_low, "V", *VOLTAGE),
-        ("voltage_high", hardware.voltage_high, "V", *VOLTAGE),
-        ("hip.max_current", hardware.hip.max_current, "A", *CURRENT),
-        ("knee.max_current", hardware.knee.max_current, "A", *CURRENT),
-    ):
-        if not least <= value <= most:
-            yield (
-                f"'hardware.{path}' is {value:g} {unit} but must lie between {least:g} and"
-                f" {most:g}: {source}."
-            )

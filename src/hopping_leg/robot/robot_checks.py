@@ -8,27 +8,22 @@ import numpy as np
 
 from hopping_leg.errors import RobotError, unknown_name
 from hopping_leg.io import Tree
-from hopping_leg.robot.hardware import contradictions, speed_constant
+from hopping_leg.robot.hardware import torque_constant
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.parameters import JOINTS, KINDS, Robot
 
-_REACH = [f"{joint}.{end}" for joint in JOINTS for end in ("lower", "upper")]
-_REACH += ["knee.stop_lower", "knee.stop_upper"]  # where the folded foot meets the hip's housing
-_AT_OUTPUT = ("torque_limit", "peak_torque", "rated_torque", "no_load_speed")
+Bounds = tuple[str, float, float, str]
+"""A number's path in a robot file, its least and largest value, and what says so."""
 
-_DEPENDENTS: dict[str, list[str]] = {}
-"""Numbers that belong to another's value, by that other's path in a robot file."""
-for _link in ("thigh", "shank"):
-    _DEPENDENTS[f"{_link}.mass"] = [f"{_link}.com", f"{_link}.inertia"]
-    _DEPENDENTS[f"{_link}.length"] = [*_DEPENDENTS[f"{_link}.mass"], *_REACH]
-for _joint in JOINTS:
-    _armature, _losses = f"{_joint}.armature", [f"{_joint}.friction", f"{_joint}.damping"]
-    _DEPENDENTS[f"{_joint}.motor.rotor_inertia"] = [_armature]
-    _DEPENDENTS[f"{_joint}.belt_ratio"] = [_armature, *_losses]
-    _at_output = [f"{_joint}.motor.{name}" for name in _AT_OUTPUT]
-    _DEPENDENTS[f"{_joint}.motor.gear_ratio"] = [_armature, *_losses, *_at_output]
+_DRIVES: tuple[Bounds, ...] = (
+    ("hardware.watchdog", 0.002, 0.1, "the drives' default is 0.1 s (servo.default_timeout_s)"),
+    ("hardware.temperature_limit", 20.0, 75.0, "drives trip at 75 deg C (servo.fault_temperature)"),
+    ("hardware.voltage_high", 10.0, 46.0, "moteus drives trip at 46 V (servo.max_voltage)"),
+)
+"""Bounds that no robot file can move: beyond them a limit guards nothing."""
+_MOST_CURRENT = 100.0, "a moteus r4 gives 100 A at most"
 
-PLAUSIBLE: dict[str, tuple[float, float]] = {
+_PLAUSIBLE: dict[str, tuple[float, float]] = {
     "mass": (5e-3, 20.0),
     "length": (0.03, 1.0),
     "com": (5e-4, 1.0),
@@ -46,12 +41,20 @@ PLAUSIBLE: dict[str, tuple[float, float]] = {
     "damping_ratio": (0.05, 20.0),
 }
 """Least and largest values, SI, that a leg on a rail may have, by the last part of the path."""
-_WIDEST = {"leg": 2 * math.pi, "pendulum": 12 * math.pi}
-"""Largest joint limits, rad, by the robot's kind."""
 _INERTIAS = (2e-3, 1.0)
 """Inertia of a link over its mass and the square of its length."""
 _ROUNDING = 1.001
-_STOPS = {f"{joint}.stop_{end}" for joint in JOINTS for end in ("lower", "upper")}
+
+_AT_OUTPUT = ("torque_limit", "peak_torque", "rated_torque", "no_load_speed")
+_DEPENDENTS: dict[str, list[str]] = {}
+"""Numbers that belong to another's value, by that other's path in a robot file."""
+for _link in ("thigh", "shank"):
+    for _key in ("mass", "length"):
+        _DEPENDENTS[f"{_link}.{_key}"] = [f"{_link}.com", f"{_link}.inertia"]
+for _joint in JOINTS:
+    for _key in ("motor.rotor_inertia", "belt_ratio", "motor.gear_ratio"):
+        _DEPENDENTS[f"{_joint}.{_key}"] = [f"{_joint}.armature"]
+    _DEPENDENTS[f"{_joint}.motor.gear_ratio"] += [f"{_joint}.motor.{key}" for key in _AT_OUTPUT]
 
 
 def numbers(tree: Tree, prefix: str = "") -> list[tuple[str, Tree]]:
@@ -76,47 +79,39 @@ def unfit_numbers(parent: Tree, child: Tree) -> dict[str, str]:
     }
 
 
-def doubts_of_inheritance(name: str, own: Tree, origin: str, inherited: Tree) -> Iterator[str]:
-    """Yield a sentence per number of a file ``name`` to which inherited ones belonged.
+def find_doubts(robot: Robot, origin: str, own: Tree, parent: str, inherited: Tree) -> list[str]:
+    """Return sentences about numbers that are hardly right or do not fit each other.
 
-    ``own`` are the file's tables, ``inherited`` all those of ``origin``, which it extends.
+    ``own`` are the tables of the robot's file, ``inherited`` those of ``parent``, which it extends.
     """
     unfit = unfit_numbers(inherited, own)
-    for cause in dict.fromkeys(unfit.values()):
-        belong = ", ".join(path for path in unfit if unfit[path] == cause)
-        yield (
-            f"{name} changes {cause} but not {belong}, inherited from {origin}; state each anew, or"
-            " as it is with your source (an armature that is not stated is what rotor and gear"
-            " give)."
-        )
-
-
-def doubts_of_values(robot: Robot, stated: Tree, origin: str) -> Iterator[str]:
-    """Yield sentences about ``stated`` numbers of a robot that are hardly right."""
-    widest = _WIDEST[robot.kind]
-    plausible = {**PLAUSIBLE, "lower": (-widest, widest), "upper": (-widest, widest)}
-    for path, entry in numbers(stated):
-        low, high = plausible.get(path.rpartition(".")[2], (-math.inf, math.inf))
-        if not path.startswith("reality."):
-            yield from _beyond(origin, path, entry["value"], low, high, entry["unit"])
+    found = [
+        f"{origin} changes {cause} but not {', '.join(p for p in unfit if unfit[p] == cause)},"
+        f" inherited from {parent}; state each anew, or as it is with your source (an armature that"
+        " is not stated is what rotor and gear give)."
+        for cause in dict.fromkeys(unfit.values())
+    ]
+    stated = (path for tree in (inherited, own) for path, _ in numbers(tree))
+    bounds = [
+        (path, *_PLAUSIBLE[path.rpartition(".")[2]])
+        for path in dict.fromkeys(stated)
+        if path.rpartition(".")[2] in _PLAUSIBLE and not path.startswith("reality.")
+    ]
     for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
         low, high = (share * link.mass * link.reach**2 for share in _INERTIAS)
-        yield from _beyond(origin, f"{name}.inertia", link.inertia, low, high, "kg m2")
+        bounds.append((f"{name}.inertia", low, high))
+    found += [
+        f"{origin}: '{path}' is {value:.5g} but hardly beyond {low:.3g} to {high:.3g}; check its"
+        " unit and decimal point."
+        for path, low, high in bounds
+        if not low <= (value := attrgetter(path)(robot)) <= high
+    ]
     if robot.kind == "leg" and not _stands(robot):
-        yield (
+        found.append(
             f"{origin}: within 'hip.lower' to 'knee.upper' the foot never comes below the hip; is a"
             " joint's sign wrong, or does the knee bend forward?"
         )
-
-
-def _beyond(
-    origin: str, path: str, value: float, low: float, high: float, unit: str
-) -> Iterator[str]:
-    if not low <= value <= high:
-        yield (
-            f"{origin}: '{path}' is {value:.5g} {unit} but hardly beyond {low:.3g} to {high:.3g}"
-            f" {unit}; check its unit and decimal point."
-        )
+    return found
 
 
 def _stands(robot: Robot) -> bool:
@@ -133,86 +128,60 @@ def check_physics(robot: Robot, origin: str) -> None:
     Raises:
         RobotError: Naming the fields that contradict each other.
     """
-    for sentence in _contradictions(robot):
-        raise RobotError(f"{origin}: {sentence}")
-
-
-def _contradictions(robot: Robot) -> Iterator[str]:
+    hip, knee = robot.hardware.servos
     if robot.kind not in KINDS:
-        yield f"'kind': {unknown_name('kind of robot', robot.kind, KINDS)}"
-    for name in JOINTS:
-        yield from _joint_contradictions(robot, name)
+        raise RobotError(f"{origin}: 'kind': {unknown_name('kind of robot', robot.kind, KINDS)}")
+    for path, low, high, why in _bounds(robot):
+        value = attrgetter(path)(robot)
+        if value is not None and not low <= value <= high:
+            lie = (
+                f"lie between {low:.5g} and {high:.5g}"
+                if high < math.inf
+                else f"be {low:.5g} or more"
+            )
+            raise RobotError(f"{origin}: '{path}' is {value:g} but must {lie}: {why}.")
+    for name, servo in zip(JOINTS, robot.hardware.servos, strict=True):
+        if servo.id % 1 or abs(servo.sign) != 1:
+            at = f"{origin}: 'hardware.{name}"
+            raise RobotError(f"{at}.id' must be a whole number, and its 'sign' 1 or -1.")
+    if hip.id == knee.id:
+        raise RobotError(f"{origin}: 'hardware.hip.id' and 'hardware.knee.id' are both {hip.id:g}.")
+
+
+def _bounds(robot: Robot) -> Iterator[Bounds]:
+    """Yield what other numbers leave of each."""
+    volts, slack = robot.hardware.voltage_high, 1e-6
+    yield from _DRIVES
+    why = "moteus drives work from 10 V, and it is less than 'hardware.voltage_high'"
+    yield "hardware.voltage_low", 10.0, volts - slack, why
+    for name, servo in zip(JOINTS, robot.hardware.servos, strict=True):
+        joint, at, by = attrgetter(name)(robot), f"{name}.motor", f"'hardware.{name}."
+        motor, reach = joint.motor, math.inf if robot.kind == "pendulum" else 2 * math.pi
+        for end in ("stop_lower", "stop_upper"):
+            yield f"{name}.{end}", -reach, reach, "no leg's joint turns more than once"
+        why = f"'{name}.stop_lower', the mechanical stop, and '{name}.upper'; is one in degrees?"
+        yield f"{name}.lower", joint.stop_lower, joint.upper - slack, why
+        why = f"'{name}.lower' and '{name}.stop_upper', the mechanical stop; is one in degrees?"
+        yield f"{name}.upper", joint.lower, joint.stop_upper, why
+        for key in ("torque_limit", "rated_torque"):
+            yield f"{at}.{key}", 0, motor.peak_torque, f"'{at}.peak_torque'"
+        most = motor.peak_torque * joint.belt_ratio
+        yield f"reality.{name}.torque_limit", 0, most, f"'{at}.peak_torque' times the belt ratio"
+        most = _ROUNDING * servo.torque_constant * servo.max_current * motor.gear_ratio
+        yield f"{at}.peak_torque", 0, most, f"{by}torque_constant' times 'max_current' and the gear"
+        most = _ROUNDING * torque_constant(servo.torque_constant) * volts / motor.gear_ratio
+        yield f"{at}.no_load_speed", 0, most, f"'hardware.voltage_high' by {by}torque_constant'"
+        yield f"{name}.load_friction", 0, 1 - slack, "or the gear never turns"
+        yield f"reality.{name}.efficiency", 0, 1, "as of any gear"
+        yield f"reality.{name}.stiction", 1, math.inf, "times Coulomb friction"
+        yield f"hardware.{name}.id", 1, 126, "a CAN id of moteus"
+        yield f"hardware.{name}.max_current", 0, *_MOST_CURRENT
     for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
-        end = f"{name}.{'extent' if link.extent else 'length'}"
-        yield from _above(f"{name}.com", link.com, end, link.reach, "m")
+        yield f"{name}.com", 0, link.reach, f"'{name}.{'extent' if link.extent else 'length'}'"
     if robot.kind == "leg":
-        for name in _STOPS:
-            if abs(stop := attrgetter(name)(robot)) > 2 * math.pi:
-                yield f"'{name}' is {stop:g} rad but no leg's joint turns more than once, 6.28 rad."
-        if robot.knee.lower < -math.pi or robot.knee.upper > 0:
-            yield (
-                "'knee.lower' and 'knee.upper' must lie between -pi and 0 rad, because a leg's knee"
-                " bends to the negative side; for a robot that only swings write kind = 'pendulum'."
-            )
-    least = 2 * TIMESTEP
-    why = "two physics steps; MuJoCo would take that instead"
-    for name, softest in (
-        ("reality.ground", robot.reality.ground.time_constant),
-        ("contact", robot.contact.time_constant),
-    ):
-        if softest is not None and softest < least:
-            yield f"'{name}.time_constant' is {softest:g} s; give at least {least:g} s, {why}."
-    yield from contradictions(robot.hardware)
-
-
-def _joint_contradictions(robot: Robot, name: str) -> Iterator[str]:
-    joint, servo = attrgetter(name)(robot), getattr(robot.hardware, name)
-    drive, motor = getattr(robot.reality, name), joint.motor
-    if joint.lower >= joint.upper:
-        high = f"'{name}.upper' ({joint.upper:g})"
-        yield f"'{name}.lower' ({joint.lower:g} rad) must lie below {high}."
-    for key, inner, outer in (
-        ("lower", joint.stop_lower, joint.lower),
-        ("upper", joint.upper, joint.stop_upper),
-    ):
-        if inner > outer:
-            yield (
-                f"'{name}.{key}' ({getattr(joint, key):g} rad) lies beyond the mechanical stop"
-                f" '{name}.stop_{key}' ({getattr(joint, f'stop_{key}'):g}); is it in degrees?"
-            )
-    peak, at = motor.peak_torque, f"{name}.motor"
-    for smaller in ("torque_limit", "rated_torque"):
-        yield from _above(
-            f"{at}.{smaller}", getattr(motor, smaller), f"{at}.peak_torque", peak, "N m"
-        )
-    if drive.torque_limit is not None:
-        high = f"{at}.peak_torque x belt_ratio"
-        limit, most = drive.torque_limit, peak * joint.belt_ratio
-        yield from _above(f"reality.{name}.torque_limit", limit, high, most, "N m")
-    constant = f"'hardware.{name}.torque_constant' ({servo.torque_constant:g} N m/A)"
-    most = servo.torque_constant * servo.max_current * motor.gear_ratio
-    if peak > most * _ROUNDING:
-        yield (
-            f"'{at}.peak_torque' is {peak:g} N m but {constant} times 'hardware.{name}.max_current'"
-            f" ({servo.max_current:g} A) and '{at}.gear_ratio' ({motor.gear_ratio:g}) gives"
-            f" {most:.3g} N m at most."
-        )
-    fastest = speed_constant(servo) * robot.hardware.voltage_high / motor.gear_ratio
-    if motor.no_load_speed > fastest * _ROUNDING:
-        yield (
-            f"'{at}.no_load_speed' is {motor.no_load_speed:g} rad/s but by {constant}"
-            f" 'hardware.voltage_high' ({robot.hardware.voltage_high:g} V) turns it at"
-            f" {fastest:.3g} rad/s at most."
-        )
-    for path, wrong, why in (
-        (f"{name}.load_friction", joint.load_friction >= 1, "less than 1, or the gear never turns"),
-        (f"reality.{name}.efficiency", drive.efficiency > 1, "at most 1, as of any gear"),
-        (f"reality.{name}.stiction", drive.stiction < 1, "1 or more, times Coulomb friction"),
-    ):
-        if wrong:
-            yield f"'{path}' is {attrgetter(path)(robot):g}; give {why}."
-
-
-def _above(low_name: str, low: float, high_name: str, high: float, unit: str) -> Iterator[str]:
-    if low > high:
-        yield f"'{low_name}' ({low:g} {unit}) must not exceed '{high_name}' ({high:g})."
+        why = "a leg's knee bends to the negative side; what only swings has kind = 'pendulum'"
+        yield "knee.lower", -math.pi, 0, why
+        yield "knee.upper", -math.pi, 0, why
+    for at in ("reality.ground", "contact"):
+        why = "two physics steps; MuJoCo would take that instead"
+        yield f"{at}.time_constant", 2 * TIMESTEP, math.inf, why

@@ -12,12 +12,7 @@ from typing import Any, get_type_hints
 from hopping_leg.errors import RobotError, nearest_names, unknown_name
 from hopping_leg.io import Tree, is_number, one_line, parse_toml, read_dataclass
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.robot.robot_checks import (
-    check_physics,
-    doubts_of_inheritance,
-    doubts_of_values,
-    unfit_numbers,
-)
+from hopping_leg.robot.robot_checks import check_physics, find_doubts, unfit_numbers
 
 DEFAULT_ROBOT = "legv2-identified"
 """The best-supported robot: the leg as its own recordings tell it."""
@@ -60,8 +55,8 @@ def robot_from_tree(tree: Tree, origin: str) -> Robot:
     Raises:
         RobotError: Naming origin, field and what was valid.
     """
-    resolved = _resolve(_chain(tree, origin))[-1]
-    robot = read_dataclass(Robot, _with_values(Robot, resolved, origin), origin, error=RobotError)
+    plain = _with_values(Robot, _complete(tree, origin), origin)
+    robot = read_dataclass(Robot, plain, origin, error=RobotError)
     if not robot.name.strip():
         raise RobotError(f"{origin}: 'name' is empty; give the robot a name.")
     check_physics(robot, origin)
@@ -86,7 +81,7 @@ def load_tree(name_or_path: str | Path) -> Tree:
         RobotError: The file, or one that it extends, is missing or not TOML.
     """
     origin = str(name_or_path)
-    return _resolve(_chain(_read(origin), origin))[-1]
+    return _complete(_read(origin), origin)
 
 
 def doubts(name_or_path: str | Path) -> list[str]:
@@ -96,46 +91,39 @@ def doubts(name_or_path: str | Path) -> list[str]:
         RobotError: As ``load_robot``.
     """
     origin = str(name_or_path)
-    chain = _chain(_read(origin), origin)
-    resolved = _resolve(chain)
-    robot, found = robot_from_tree(resolved[-1], origin), list[str]()
-    if len(chain) > 1:
-        found += doubts_of_inheritance(*chain[-1], chain[-2][0], resolved[-2])
-    return [*found, *doubts_of_values(robot, resolved[-1], origin)]
+    own = _read(origin)
+    return find_doubts(robot_from_tree(own, origin), origin, own, *_parent(own, origin))
 
 
-def _chain(tree: Tree, name: str) -> list[tuple[str, Tree]]:
-    """Return the files that a robot consists of, each with its own tables, the root first."""
-    chain = [(name, tree)]
-    while "extends" in tree:
-        parent = tree["extends"]
-        if not isinstance(parent, str):
-            raise RobotError(
-                f"{name}: 'extends' must be a robot's name or file, not {one_line(parent)}."
-            )
-        name = _beside(name, parent)
-        names = [file for file, _ in reversed(chain)]
-        if name in names:
-            circle = " -> ".join((*names, name))
-            raise RobotError(f"{name}: robots extend each other in a circle ({circle}).")
-        tree = _read(name)
-        chain.insert(0, (name, tree))
-    return chain
+def _complete(tree: Tree, name: str, heirs: tuple[str, ...] = ()) -> Tree:
+    """Return all tables of a file, those that it inherits among them.
+
+    A stated armature holds for its own gear: a file that changes the gear does not inherit it.
+    """
+    own = {key: value for key, value in tree.items() if key != "extends"}
+    _, inherited = _parent(tree, name, heirs)
+    merged = _merge(inherited, own)
+    for path in unfit_numbers(inherited, own):
+        joint, _, number = path.partition(".")
+        if number == "armature":
+            merged[joint] = {k: v for k, v in merged[joint].items() if k != number}
+    return merged
 
 
-def _resolve(chain: list[tuple[str, Tree]]) -> list[Tree]:
-    """Return all tables of each file of a chain; a stated armature holds for its own gear."""
-    resolved: list[Tree] = []
-    for _, tree in chain:
-        own = {key: value for key, value in tree.items() if key != "extends"}
-        parent = resolved[-1] if resolved else {}
-        merged = _merge(parent, own)
-        for path in unfit_numbers(parent, own):
-            joint, _, number = path.partition(".")
-            if number == "armature":
-                merged[joint] = {k: v for k, v in merged[joint].items() if k != number}
-        resolved.append(merged)
-    return resolved
+def _parent(tree: Tree, name: str, heirs: tuple[str, ...] = ()) -> tuple[str, Tree]:
+    """Return name and all tables of what a file extends, which ``heirs`` extend; may be none."""
+    parent = tree.get("extends", "")
+    if not isinstance(parent, str):
+        raise RobotError(
+            f"{name}: 'extends' must be a robot's name or file, not {one_line(parent)}."
+        )
+    if "extends" not in tree:
+        return "", {}
+    parent, heirs = _beside(name, parent), (*heirs, name)
+    if parent in heirs:
+        circle = " -> ".join((*heirs, parent))
+        raise RobotError(f"{parent}: robots extend each other in a circle ({circle}).")
+    return parent, _complete(_read(parent), parent, heirs)
 
 
 def _beside(name: str, parent: str) -> str:
