@@ -15,7 +15,10 @@ def transition(
         return np.array([value], dtype=float)
 
     return Transition(
-        state=row((height, *q, rate, *qd)),
+        height=row(height),
+        rate=row(rate),
+        q=row(q),
+        qd=row(qd),
         command=row(command),
         action=row(action),
         last_action=row(last),

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.envs.paper_reward import action_jerk, joint_position_penalty, position_limits
+from hopping_leg.envs.paper_reward import action_jerk, position_term
 from hopping_leg.envs.rewards import LastingTerm, Reward, RewardTerm, Transition, sum_of_joints
 from hopping_leg.robot import Robot, kinematics
 
@@ -65,7 +65,7 @@ class ApexRewardConfig:
 
 def apex_reward(robot: Robot, config: ApexRewardConfig, rate: float) -> Reward:
     """Return the reward that judges ticks by predicted and reached apexes; rate is in Hz."""
-    c, limits = config, position_limits(robot)
+    c = config
     return Reward(
         (
             RewardTerm("apex", c.apex, ApexEvent(c.width, 1 / rate)),
@@ -77,7 +77,7 @@ def apex_reward(robot: Robot, config: ApexRewardConfig, rate: float) -> Reward:
             ),
             RewardTerm("jerk", -c.jerk, action_jerk),
             RewardTerm("effort", -c.effort, flight_effort),
-            RewardTerm("position", -c.position, partial(joint_position_penalty, limits=limits)),
+            position_term(robot, c.position),
             RewardTerm("velocity", -c.velocity, joint_overspeed),
             RewardTerm("clearance", -c.clearance, partial(ground_closeness, robot=robot)),
         ),
@@ -104,15 +104,19 @@ class ApexEvent(LastingTerm):
 
     def __call__(self, t: Transition) -> Array:
         """Return the kernel of the apex error, weighted, 0 without an apex, (n,)."""
-        if len(self._air) != len(t.apex):
-            self._air, self._since = np.zeros(len(t.apex)), np.full(len(t.apex), _FULL_PERIOD)
-        self._air = np.where(t.flying, self._air + self._period, 0.0)
-        since = self._since + self._period
-        self._since = np.where(t.apex, 0.0, since)
-        motion = np.square(np.minimum(1.0, self._air / _FULL_AIR))
-        patience = np.minimum(1.0, since / _FULL_PERIOD)
-        kernel = np.exp(-np.abs(t.apex_height - t.command) / self._width)
-        return np.where(t.apex, motion * patience * kernel, 0.0)
+        event = np.zeros(len(t.apex))
+        if len(self._air) != len(event):
+            self._air, self._since = event.copy(), event + _FULL_PERIOD
+        self._air = (self._air + self._period) * t.flying
+        self._since = self._since + self._period
+        (legs,) = t.apex.nonzero()
+        if len(legs):
+            motion = np.square(np.minimum(1.0, self._air[legs] / _FULL_AIR))
+            patience = np.minimum(1.0, self._since[legs] / _FULL_PERIOD)
+            error = np.abs(t.apex_height[legs] - t.command[legs])
+            event[legs] = motion * patience * np.exp(-error / self._width)
+            self._since[legs] = 0.0
+        return event
 
     def restart(self, rows: IntArray) -> None:
         """Forget the past of some legs."""
@@ -137,8 +141,8 @@ def predicted_apex_accuracy(t: Transition) -> Array:
     """Return base speed times how near the ballistic apex is to the command, 0 on the ground."""
     error = np.abs(ballistic_apex(t) - t.command)
     narrow, wide = _PREDICTION_WIDTHS
-    kernel = np.exp(-error / narrow) + 0.5 * np.exp(-error / wide)
-    return np.where(t.flying, np.abs(t.rate) * kernel, 0.0)
+    kernel = np.exp(error / -narrow) + 0.5 * np.exp(error / -wide)
+    return np.abs(t.rate) * kernel * t.flying
 
 
 def bounded_energy_gain(t: Transition, beyond: float) -> Array:
@@ -152,7 +156,7 @@ def bounded_energy_gain(t: Transition, beyond: float) -> Array:
 
 def flight_effort(t: Transition) -> Array:
     """Return the sum of the actions' squares in flight, 0 on the ground."""
-    return np.where(t.flying, sum_of_joints(np.square(t.action)), 0.0)
+    return sum_of_joints(np.square(t.action)) * t.flying
 
 
 def joint_overspeed(t: Transition) -> Array:

@@ -15,11 +15,18 @@ from hopping_leg.arrays import Array, BoolArray, IntArray
 class Transition:
     """True state after a tick of n legs and the actions around it.
 
-    The arrays are live: they change with the next tick, so keep copies.
+    The arrays are live: they change with the next tick, so keep copies. Those of the state have one
+    column after the other in memory, as numpy is slow on rows of two.
     """
 
-    state: Array
-    """Base height, hip and knee angle, and their rates, m, rad, m/s, rad/s, (n, 6)."""
+    height: Array
+    """Base height x, m, (n,)."""
+    rate: Array
+    """Base velocity, m/s, (n,)."""
+    q: Array
+    """Joint positions, rad, (n, 2)."""
+    qd: Array
+    """Joint velocities, rad/s, (n, 2)."""
     command: Array
     """Desired height x^d in force during the tick, m, (n,)."""
     action: Array
@@ -32,26 +39,6 @@ class Transition:
     """Height of that apex, else NaN, m, (n,)."""
     measure_clearance: Callable[[], Array]
     """Computes ``foot_clearance`` for the terms that need it."""
-
-    @property
-    def height(self) -> Array:
-        """Base height x, m, (n,)."""
-        return self.state[:, 0]
-
-    @property
-    def rate(self) -> Array:
-        """Base velocity, m/s, (n,)."""
-        return self.state[:, 3]
-
-    @property
-    def q(self) -> Array:
-        """Joint positions, rad, (n, 2)."""
-        return self.state[:, 1:3]
-
-    @property
-    def qd(self) -> Array:
-        """Joint velocities, rad/s, (n, 2)."""
-        return self.state[:, 4:6]
 
     @cached_property
     def foot_clearance(self) -> Array:
@@ -115,6 +102,7 @@ class Reward:
     def __init__(self, terms: Sequence[RewardTerm], scale: float = 1.0) -> None:
         self.terms, self.scale = tuple(terms), scale
         self.names = tuple(term.name for term in terms)
+        self._functions = tuple(term.function for term in terms)
         if len(set(self.names)) < len(self.names):
             raise errors.UsageError(f"Terms of a reward need names of their own, not {self.names}.")
         self._lasting = {t.name: t.function for t in terms if isinstance(t.function, LastingTerm)}
@@ -133,9 +121,9 @@ class Reward:
 
     def __call__(self, transition: Transition) -> tuple[Array, Array]:
         """Return the reward, (n,), and its unweighted terms, (n, k)."""
-        terms = np.empty((len(transition.state), len(self.terms)))
-        for column, term in enumerate(self.terms):
-            terms[:, column] = term.function(transition)
+        terms = np.empty((len(transition.height), len(self.terms)))
+        for column, term in enumerate(self._functions):
+            terms[:, column] = term(transition)
         return np.vecdot(terms, self._weights), terms
 
     def restart(self, rows: IntArray) -> None:

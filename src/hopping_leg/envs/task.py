@@ -106,6 +106,9 @@ class HoppingTask:
         for constant in (self._never, self._nan):
             constant.flags.writeable = False
         self.command = np.empty(count)
+        self._torque = np.empty((count, 2))
+        self._columns = columns = np.empty((6, count))
+        self._true = columns[0], columns[3], columns[1:3].T, columns[4:6].T
         self.applied_torque = np.zeros((count, 2))
         """What the motors gave in the last control period, mean, N m, (n, 2)."""
         self._tick = 0
@@ -180,20 +183,20 @@ class HoppingTask:
             UsageError: Actions are not finite or of another shape; nothing has moved.
         """
         legs = self.legs
-        taken, torque = np.array(action, np.float64), np.empty((self.count, 2))
+        taken, torque = np.array(action, np.float64), self._torque
         if taken.shape != torque.shape or not _clip(taken, self.full_torque, torque):
             self._refuse(taken)
         command, height_before = self.command.copy(), legs.height.copy()
         self.applied_torque = self.plant.drive(torque)
-        apex, apex_height, apex_error = self._apexes(height_before)
-        reward, terms = self.reward(
-            rewards.Transition(
-                legs.state, command, taken, self.last_action,
-                apex, apex_height, legs.foot_clearance,
-            )
+        self._columns[:] = legs.state.T
+        transition = rewards.Transition(
+            *self._true, command, taken, self.last_action, self._never, self._nan,
+            legs.foot_clearance,
         )  # fmt: skip
+        apex_error = self._find_apexes(transition, height_before)
+        reward, terms = self.reward(transition)
         self.last_action = taken
-        return self._next(reward, terms, command, apex_error, apex_height)
+        return self._next(reward, terms, command, apex_error, transition.apex_height)
 
     def _refuse(self, action: Array) -> NoReturn:
         wrong = f"an array of shape {action.shape}"
@@ -212,14 +215,15 @@ class HoppingTask:
             " let it go on with its task.restore(...) from this one's task.state()."
         )
 
-    def _apexes(self, height_before: Array) -> tuple[BoolArray, Array, Array]:
-        legs = self.legs
+    def _find_apexes(self, transition: rewards.Transition, height_before: Array) -> Array:
+        """Set the transition's apexes; return their errors."""
         rose, self._rises = self._rises, np.empty(self.count, np.bool_)
-        if not _update_rises(legs.state, rose, self._rises):
-            return self._never, self._nan, self._nan
-        apex = hop_detection.at_apex(rose, self._rises, legs.foot_clearance())
-        height = np.where(apex, np.maximum(height_before, legs.height), np.nan)
-        return apex, height, height - self.command
+        if not _update_rises(self.legs.state, rose, self._rises):
+            return self._nan
+        apex = hop_detection.at_apex(rose, self._rises, transition.foot_clearance)
+        height = np.where(apex, np.maximum(height_before, transition.height), np.nan)
+        transition.apex, transition.apex_height = apex, height
+        return height - transition.command
 
     def privileged(self) -> Array32:
         """Return true states, and where the legs' numbers lie in their ranges, (n, size)."""
