@@ -84,11 +84,6 @@ class FlightRecorderTail:
         """Whether the file is gone: the run has ended and left its trace."""
         return os.fstat(self._file.fileno()).st_nlink == 0
 
-    @property
-    def whole(self) -> bool:
-        """Whether what was read ends with a whole frame."""
-        return not self._rest
-
     def rows(self) -> Array:
         """Return the rows that were written since the last call, (ticks, columns).
 

@@ -1,18 +1,13 @@
 """What a terminal shows: texts as they are, tables with whole values, how long work goes."""
 
 import contextlib
-import sys
-import threading
 import time
-from collections.abc import Iterator
 from typing import Self
 
 import rich.progress
 from rich.console import Console
 from rich.table import Table
 
-_SILENCE = 1.5
-"""Time after which work that has said nothing says what it is, s."""
 _LINE_SECONDS = 30.0
 _PACE_SECONDS = 600.0
 """Latest time whose pace tells the time left, s."""
@@ -35,7 +30,7 @@ def print_table(table: Table, console: Console | None = None) -> None:
 
 
 class Progress(contextlib.AbstractContextManager["Progress"]):
-    """A bar of all work on a terminal, a line now and then elsewhere.
+    """A bar of all work on a terminal, a line every half minute elsewhere.
 
     Args:
         title: What is done, as long as no label is shown.
@@ -45,29 +40,18 @@ class Progress(contextlib.AbstractContextManager["Progress"]):
 
     def __init__(self, title: str = "", *, parts: int = 0, quiet: bool = False) -> None:
         self._console = plain_console(stderr=True, quiet=quiet)
-        self._left = rich.progress.TimeRemainingColumn()
         self._bar = rich.progress.Progress(
             rich.progress.TextColumn("{task.description}", markup=False),
             rich.progress.BarColumn(bar_width=20),
             rich.progress.TextColumn("{task.percentage:>3.0f} %"),
-            self._left,
+            rich.progress.TimeRemainingColumn(),
             rich.progress.TextColumn("{task.fields[note]}", markup=False),
             console=self._console,
             disable=not self._console.is_terminal,
             speed_estimate_period=_PACE_SECONDS,
-            get_time=lambda: time.monotonic(),
         )
         self._task = self._bar.add_task(title, total=None, note="")
-        self._parts, self._labels = parts, list[str]()
-        self._began = time.monotonic()
-        self._over = threading.Event()
-        self.text = title
-        """What the next line says."""
-
-    @property
-    def passed(self) -> float:
-        """Time since the work began, s."""
-        return time.monotonic() - self._began
+        self._parts, self._labels, self._said = parts, list[str](), time.monotonic()
 
     def show(self, label: str, share: float, note: str = "", *, about: str = "") -> None:
         """Show what is done, more of that label, the share done, 0 to 1, and what stands behind."""
@@ -78,42 +62,18 @@ class Progress(contextlib.AbstractContextManager["Progress"]):
             number = self._labels.index(label)
             share = (number + share) / self._parts
             label = f"{number + 1} of {self._parts}: {label}"
-        task = self._bar.tasks[0]
-        if share < task.completed:
+        if share < self._bar.tasks[0].completed:
             self._bar.reset(self._task)
         self._bar.update(self._task, description=label, completed=share, total=1.0, note=note)
-        left = f"{self._left.render(task)} left" if task.time_remaining else ""
-        done = f"{label} {100 * share:.0f} %".strip()
-        self.text = " · ".join(filter(None, (done, note, left)))
-
-    def _tell(self) -> None:
-        wait = _SILENCE
-        while not self._over.wait(wait):
-            if self.text:
-                self._console.print(self.text, soft_wrap=True)
-            wait = _LINE_SECONDS
+        if self._bar.disable and time.monotonic() - self._said >= _LINE_SECONDS:
+            self._said = time.monotonic()
+            self._console.print(f"{label} {100 * share:.0f} % {note}".strip(), soft_wrap=True)
 
     def __enter__(self) -> Self:
         """Start drawing."""
         self._bar.start()
-        if self._bar.disable:
-            threading.Thread(target=self._tell, daemon=True).start()
         return self
 
     def __exit__(self, *_: object) -> None:
         """Leave the bar as it is."""
-        self._over.set()
         self._bar.stop()
-
-
-@contextlib.contextmanager
-def said_if_slow(text: str) -> Iterator[None]:
-    """Say on stderr what is going on, if it is: on a terminal soon, elsewhere after a while."""
-    wait = _SILENCE if sys.stderr.isatty() else _LINE_SECONDS
-    timer = threading.Timer(wait, lambda: print(text, file=sys.stderr))
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()

@@ -85,14 +85,13 @@ class RayWorkers:
 
     Args:
         address: Address of the cluster; ``local`` or None starts one on this machine, which ends
-            with this process.
-        count: How many tasks at once; None takes one per CPU.
+            with this process. As many tasks run at once as it has CPUs.
 
     Raises:
         UsageError: Ray is not installed or the cluster cannot be reached.
     """
 
-    def __init__(self, address: str | None = None, count: int | None = None) -> None:
+    def __init__(self, address: str | None = None) -> None:
         # Otherwise a cluster that is started here tells its makers about itself.
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         try:
@@ -111,7 +110,7 @@ class RayWorkers:
                     f"There is no Ray cluster at {address or 'local'}: {str(error).rstrip('.')};"
                     " start one with `ray start --head`, or leave the address out."
                 ) from error
-        self.count = count or max(1, int(ray.cluster_resources().get("CPU", 1)))
+        self.count = max(1, int(ray.cluster_resources().get("CPU", 1)))
 
     def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> list[R]:
         """As ``ProcessWorkers`` does; a task that dies begins again, the function is sent once."""
