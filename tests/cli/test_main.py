@@ -1,5 +1,4 @@
 import errno
-import json
 import os
 import signal
 import subprocess
@@ -137,12 +136,10 @@ def test_every_verb_has_help(capsys, verb):
     assert "Examples:" in shown
 
 
-def test_list_names_every_shipped_robot(capsys, tmp_path):
-    file = tmp_path / "robots.json"
-    assert main(["robots", "list", "--json", str(file)]) == 0
+def test_list_names_every_shipped_robot(capsys):
+    assert main(["robots", "list"]) == 0
     shown = capsys.readouterr().out
     assert all(name in shown for name in shipped_robots())
-    assert [robot["name"] for robot in json.loads(file.read_text())] == shipped_robots()
 
 
 @pytest.mark.parametrize("name", shipped_robots())
@@ -155,14 +152,12 @@ def test_show_gives_every_number_with_unit_and_source(capsys, name):
         line = next(line for line in shown.splitlines() if f" {path} " in line)
         assert f"{entry['value']:g}" in line
         assert entry["source"] in line
+    assert load_robot(name).digest in shown
 
 
-def test_check_accepts_the_example_and_show_writes_the_digest(tmp_path, capsys):
+def test_check_accepts_the_example(capsys):
     assert main(["robots", "check", "examples/my_leg.toml"]) == 0
     assert "valid robot: my-leg" in capsys.readouterr().out
-    file = tmp_path / "robot.json"
-    assert main(["robots", "show", "legv2", "--json", str(file)]) == 0
-    assert json.loads(file.read_text())["derived"]["digest"] == load_robot("legv2").digest
 
 
 def test_urdf_is_written_to_a_file_or_printed(tmp_path, capsys):

@@ -34,9 +34,7 @@ from hopping_leg.emulator.mode_machine import Notice
 from hopping_leg.robot import DEFAULT_ROBOT, JOINTS
 
 if TYPE_CHECKING:
-    from hopping_leg.emulator.server import Server
-
-_RECENTLY = 1.0  # Before the drives stopped, s
+    from hopping_leg.emulator.robot import EmulatedRobot
 
 
 @dataclass(frozen=True)
@@ -94,7 +92,7 @@ def run(args: Emulate) -> None:
         if args.realtime and prefer_this_thread() is not None:
             say("Without real-time priority the drives may answer late under load.")
         server = Server(robot, port)
-        server.on_turn = _Events(server).tell
+        server.on_turn = _Events(robot).tell
         with uninterrupted():
             server.run(lambda: robot.time >= seconds)
     say(f"The emulator ended after {robot.time:.1f} s.")
@@ -108,34 +106,26 @@ def _kind_cells(name: str) -> tuple[str, ...]:
 
 
 class _Events:
-    """Tells faults, changes of mode and that the computer was late, each on a line."""
+    """Tells faults and changes of mode, each on a line."""
 
-    def __init__(self, server: "Server") -> None:
-        self._server, self._robot = server, server.robot
-        self._modes = [drive.machine.mode for drive in self._robot.drives]
-        self._faults_shown = 0
+    def __init__(self, robot: "EmulatedRobot") -> None:
+        self._robot, self._faults_shown = robot, 0
+        self._modes = [drive.machine.mode for drive in robot.drives]
 
     def tell(self) -> None:
         """Print what is new."""
-        robot, log, before = self._robot, self._robot.fault_injector.log, self._modes
+        log, before = self._robot.fault_injector.log, self._modes
         for begun, fault in log[self._faults_shown :]:
             who = "" if fault.kind == "unplug" else f" ({fault.drive})"
             print(f"{begun:7.3f} s  fault: {KINDS[fault.kind].text}{who}", flush=True)
         self._faults_shown = len(log)
-        self._modes = [drive.machine.mode for drive in robot.drives]
-        for name, mode, old, drive in zip(JOINTS, self._modes, before, robot.drives, strict=True):
+        self._modes = [drive.machine.mode for drive in self._robot.drives]
+        for name, old, drive in zip(JOINTS, before, self._robot.drives, strict=True):
+            mode = drive.machine.mode
             if mode is not old:
                 why = _why(drive.machine.fault) if mode is DriveMode.FAULT else ""
                 text = mode.name.lower().replace("_", " ")
-                print(f"{robot.time:7.3f} s  {name}: {text}{why}", flush=True)
-        late = self._server.latest(_RECENTLY)
-        if late and DriveMode.POSITION in before and DriveMode.POSITION not in self._modes:
-            print(
-                f"{robot.time:7.3f} s  this computer was late, by {late * 1e3:.0f} ms: the drives"
-                " stood still so long; end other programs, or permit real-time priority (rtprio in"
-                " /etc/security/limits.conf)",
-                flush=True,
-            )
+                print(f"{self._robot.time:7.3f} s  {name}: {text}{why}", flush=True)
 
 
 def _why(code: int) -> str:

@@ -11,44 +11,37 @@ Examples:
   hop robots draw twins --count 20 --out runs/twins
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import tyro
 
-from hopping_leg.cli.options import at_least, save_json, say, show_table
+from hopping_leg.cli.options import at_least, say, show_table
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import Robot, build_model, importing, numbers, robot_files
 from hopping_leg.robot.planar_leg import read_leg
-
-Target = tyro.conf.Positional[str]
 
 
 @dataclass(frozen=True)
 class List:
     """List the robots that come with the package."""
 
-    json: Path | None = None
-    """Write the list to this file as JSON."""
-
 
 @dataclass(frozen=True)
 class Show:
     """Show every number of a robot with unit and source, e.g. `hop robots show legv2`."""
 
-    robot: Target
+    robot: tyro.conf.Positional[str]
     """A shipped name or the path of a .toml file."""
-    json: Path | None = None
-    """Write the numbers to this file as JSON."""
 
 
 @dataclass(frozen=True)
 class Check:
     """Check a robot file, e.g. `hop robots check my_leg.toml`; exit code 2 when it is wrong."""
 
-    robot: Target
+    robot: tyro.conf.Positional[str]
     """The path of a .toml file, or a shipped name."""
 
 
@@ -97,10 +90,8 @@ def run(
 ) -> None:
     """List, show, import, check or draw robots."""
     if isinstance(args, List):
-        robots = [robot_files.load_robot(name) for name in robot_files.shipped_robots()]
-        for robot in robots:
+        for robot in map(robot_files.load_robot, robot_files.shipped_robots()):
             print(f"{robot.name:<12}  {robot.description}\n{'':<12}  {_summary(robot)}")
-        save_json(args.json, [{"name": r.name, **derived(r)} for r in robots])
     elif isinstance(args, Import):
         _import(args)
     elif isinstance(args, Draw):
@@ -108,19 +99,15 @@ def run(
     else:
         tree = robot_files.load_tree(args.robot)
         robot = robot_files.robot_from_tree(tree, args.robot)
-        doubts = robot_files.doubts(args.robot)
         if isinstance(args, Show):
             rows = [(p, f"{e['value']:g}", e["unit"], e["source"]) for p, e in numbers(tree)]
-            for path, value in derived(robot).items():
-                shown = f"{value:g}" if isinstance(value, float) else value
-                rows.append((path, shown, "", "computed"))
-            title = f"{robot.name}: {robot.description}"
+            rows.append(("digest", robot.digest, "", "computed"))
+            title = f"{robot.name}: {robot.description} ({_summary(robot)})"
             show_table(("number", "value", "unit", "source"), rows, title)
-            save_json(args.json, {**asdict(robot), "derived": derived(robot), "doubts": doubts})
         else:
             build_model(robot)
             print(f"{args.robot} is a valid robot: {robot.name} ({_summary(robot)}).")
-        say(*(f"But {doubt}" for doubt in doubts))
+        say(*(f"But {doubt}" for doubt in robot_files.doubts(args.robot)))
 
 
 def _draw(args: Draw) -> None:
@@ -136,7 +123,7 @@ def _draw(args: Draw) -> None:
 
 
 def _import(args: Import) -> None:
-    """Write the robot file, say what was assumed in it and what comes next."""
+    """Write the robot file, say what was assumed in it."""
     out = args.out or Path(f"{args.description.stem}.toml")
     if out.exists():
         raise UsageError(f"{out} exists and is not replaced; remove it, or give another --out.")
@@ -146,30 +133,12 @@ def _import(args: Import) -> None:
     robot = robot_files.robot_from_tree(made.tree, str(out))
     build_model(robot)
     write_atomically(out, robot_files.robot_text(made.tree, made.comment).encode())
+    entries = dict(numbers(made.tree))
     say(*made.comment.splitlines())
-    if made.assumed:
-        entries = dict(numbers(made.tree))
-        rows = [
-            (path, f"{entries[path]['value']:g}", entries[path]["unit"], why)
-            for path, why in made.assumed.items()
-        ]
-        title = f"assumed, since {args.description.name} does not say"
-        show_table(("number", "value", "unit", "because"), rows, title)
+    for path, why in made.assumed.items():
+        say(f"Assumed: {path} = {entries[path]['value']:g} {entries[path]['unit']} ({why})")
     say(f"Wrote {out}: {robot.name} ({_summary(robot)}).")
     say(*(f"But {doubt}" for doubt in robot_files.doubts(out)))
-
-
-def derived(robot: Robot) -> dict[str, Any]:
-    """Return the numbers that follow from a robot's parameters, SI units."""
-    return {
-        "mass_kg": robot.mass,
-        "straight_height_m": robot.straight_height,
-        "hip_torque_limit_nm": robot.hip.torque_limit,
-        "knee_torque_limit_nm": robot.knee.torque_limit,
-        "hip_armature_kg_m2": robot.hip.armature,
-        "knee_armature_kg_m2": robot.knee.armature,
-        "digest": robot.digest,
-    }
 
 
 def _summary(robot: Robot) -> str:

@@ -6,7 +6,6 @@ with the clock, and answers.
 
 import select
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -99,9 +98,6 @@ def posture(robot: Robot, pose: str) -> Array:
 _FURTHEST = 0.02
 """Most that is caught up with at once after the process was held off, s; the rest is lost."""
 
-_NOTICED = 0.005
-"""Longest that a drive may be late before it is remembered, s: a control period."""
-
 
 class Server:
     """Runs an emulated robot behind a port."""
@@ -111,7 +107,6 @@ class Server:
         self.on_turn: Callable[[], None] = lambda: None
         """Called after every step, e.g. to show the state."""
         self.lost = 0.0  # Time that was not simulated as the process did not get the processor, s
-        self._late: deque[tuple[float, float]] = deque(maxlen=100)
         self._offset = time.monotonic() - robot.time
 
     def run(self, stop: Callable[[], bool]) -> None:
@@ -131,15 +126,9 @@ class Server:
         serve(self.robot, self.port, ready=bool(ready))
         self.on_turn()
 
-    def latest(self, seconds: float) -> float:
-        """Return how late this computer was at most in so many seconds, s; 0 if it was not."""
-        return max((late for t, late in self._late if t >= self.robot.time - seconds), default=0.0)
-
     def _catch_up(self) -> None:
         now = time.monotonic() - self._offset
         behind = now - self.robot.time
-        if behind > _NOTICED:
-            self._late.append((self.robot.time, behind))
         if (lost := behind - _FURTHEST) > 0:
             self._offset += lost
             self.lost += lost
