@@ -118,14 +118,13 @@ def share_of_the_motors(drawn):
     return ((drawn[..., 1] > 110) & (drawn[..., 0] < 90)).mean()
 
 
-def test_the_leg_moves_nothing_covers_it_and_a_slow_browser_draws_fewer_pixels(page):
+def test_the_leg_moves_and_a_slow_browser_draws_fewer_pixels(page):
     with simulated(page, "fast", 0.30):
         # The page is connected before its meshes are drawn, seconds before on a busy computer.
         until(lambda: share_of_the_motors(picture(page)) > 0.005)
         first = picture(page)
         until(lambda: (np.abs(first - picture(page)).max(axis=-1) > 40).mean() > 0.005)
         assert share_of_the_motors(picture(page)) > 0.005
-        until(lambda: page.get_by_text("Software WebGL").count() == 0)
         share = "(() => { const c = document.querySelector('canvas[data-engine]');"
         share += " return c.width / c.clientWidth; })()"
         page.evaluate("() => setInterval(() => { const end = performance.now() + 90;"

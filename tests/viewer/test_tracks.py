@@ -89,7 +89,7 @@ def test_what_hop_deploy_records_is_shown_with_the_estimate_of_the_controller(tm
     writer = FlightRecorder(tmp_path / f"es-1{SUFFIX}", names, header)
     seen = {"hip_position_rad": 0.7, "knee_position_rad": -1.4, "knee_torque_nm": 3.0}
     for tick, estimate in enumerate((float("nan"), 0.33)):
-        told = {"time_s": tick / 200, "estimated_height_m": estimate, "phase": 1.0}
+        told = {"time_s": tick / 200, "estimated_height_m": estimate}
         writer.row(list((dict.fromkeys(names, 0.0) | seen | told).values()))
     writer.close()
     follow = RecorderSource(tmp_path)
@@ -98,7 +98,6 @@ def test_what_hop_deploy_records_is_shown_with_the_estimate_of_the_controller(tm
     standing = kinematics.stance_height(ROBOT, np.array([0.7, -1.4]))
     assert [track.moment(tick / 200)[0] for tick in (0, 1)] == [pytest.approx(standing), 0.33]
     assert track.latest("knee_torque_nm", follow.now) == 3.0
-    assert track.latest("phase", follow.now) == 1.0
     assert "estimate" in track.note
 
 

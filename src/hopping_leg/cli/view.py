@@ -28,7 +28,7 @@ from hopping_leg.cli.options import say
 from hopping_leg.errors import UsageError
 
 if TYPE_CHECKING:
-    from hopping_leg.viewer.tracks import DataSource
+    from hopping_leg.viewer.viewer import Source
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def run(args: View) -> None:
         viewer.close()
 
 
-def _source(args: View) -> "DataSource":
+def _source(args: View) -> "Source":
     """Return what is to be shown; whatever can be wrong with it is found here."""
     from hopping_leg.controllers.registry import robot_of
     from hopping_leg.viewer.live_leg import LiveSimulation

@@ -21,10 +21,7 @@ from hopping_leg.sim import (
 )
 from hopping_leg.sim.compiled import FOLDER, say_compiling, was_compiled
 from hopping_leg.sim.mujoco_simulator import MujocoSimulator
-from hopping_leg.viewer.tracks import FIELDS, MOST, Track
-
-KEPT_SECONDS = 10.0
-"""Of every leg's past."""
+from hopping_leg.viewer.tracks import FIELDS, KEPT, MOST, Track
 
 PUSH_SECONDS = 0.05
 """How long a push lasts."""
@@ -144,7 +141,6 @@ class LiveSimulation:
         seen = self._plant.sense(rows[0])
         torques = [c.act(_of_leg(seen, leg)) for leg, c in enumerate(self._controllers)]
         rows[5:7] = self._plant.drive(np.concatenate(torques)).T
-        rows[8] = [c.internals().get("phase", [np.nan])[0] for c in self._controllers]
         for leg, track in enumerate(self.tracks):
             if np.abs(legs.qd[leg]).max() < _IMPOSSIBLE:
                 track.extend(np.array([self.now]), rows[:, leg : leg + 1])
@@ -191,8 +187,8 @@ class LiveSimulation:
             self.settings = default_settings(robot)
         self.robot, self.robot_name, self.names = robot, robot_name, names
         self.set_height(self.height)
-        self._controllers, depth = controllers, round(KEPT_SECONDS * CONTROL_RATE)
-        self.tracks = [Track(c.name, robot, depth=depth) for c in controllers]
+        self._controllers = controllers
+        self.tracks = [Track(c.name, robot, depth=KEPT) for c in controllers]
         self._rng = np.random.default_rng(self._seed)
         self._legs = self._simulator()
         self._meet()

@@ -8,13 +8,12 @@ import viser
 
 from hopping_leg.controllers.registry import controller_names
 from hopping_leg.errors import HoppingLegError, UsageError
-from hopping_leg.io import is_number, one_line
+from hopping_leg.io import one_line
 from hopping_leg.robot import load_robot, shipped_robots
 from hopping_leg.viewer import live_leg, tracks
 from hopping_leg.viewer.live_leg import Range
 
 Action = Callable[[], object]
-_ROUNDING = 1e-6  # Of the page's numbers
 
 
 def chosen(handle: Any, offered: Collection[str]) -> str:  # noqa: ANN401
@@ -22,14 +21,6 @@ def chosen(handle: Any, offered: Collection[str]) -> str:  # noqa: ANN401
     if handle.value not in offered:
         raise UsageError(f"The page sent {one_line(handle.value)}, which it does not offer.")
     return str(handle.value)
-
-
-def within(handle: Any, bounds: Range) -> float:  # noqa: ANN401
-    """Return a number of the page; UsageError where its slider does not reach it."""
-    value, (low, high) = handle.value, bounds
-    if not is_number(value) or not low - _ROUNDING <= value <= high + _ROUNDING:
-        raise UsageError(f"The page sent {one_line(value)}, not {low:g} to {high:g}.")
-    return float(min(max(value, low), high))
 
 
 class Inputs:
@@ -119,8 +110,8 @@ class LivePanel:
         names = self._names = tuple(dict.fromkeys((*controller_names(), *live.names)))
         legs = [name for name in shipped_robots() if load_robot(name).kind == "leg"]
         robots = self._robots = tuple(dict.fromkeys((*legs, live.robot_name)))
-        first, beside = self._shown_names()
-        self._first = inputs.choice("Controller", names, first, self._begin)
+        self._first = inputs.choice("Controller", names, live.names[0], self._begin)
+        beside = (*live.names, NOBODY)[1]
         self._second = inputs.choice("Beside it", (NOBODY, *names), beside, self._begin)
         self._robot = inputs.choice("Robot", robots, live.robot_name, self._begin)
         inputs.button("Stand up", "R", viser.Icon.RELOAD, live.stand)
@@ -134,45 +125,34 @@ class LivePanel:
             self._noise.on_update(inputs.asking(self._settings))
         with gui.add_folder("Push the base"):
             force = inputs.slider("Force, N", live_leg.PUSH, 1.0, 30.0, lambda: None)
-            for label, key, icon, sign in (
-                ("Push up", "P", viser.Icon.ARROW_UP, 1),
-                ("Push down", "O", viser.Icon.ARROW_DOWN, -1),
-            ):
-
-                def push(sign: int = sign) -> None:
-                    live.push(sign * within(force, live_leg.PUSH))
-
-                inputs.button(label, key, icon, push)
+            up, down = viser.Icon.ARROW_UP, viser.Icon.ARROW_DOWN
+            inputs.button("Push up", "P", up, lambda: live.push(force.value))
+            inputs.button("Push down", "O", down, lambda: live.push(-force.value))
 
     def _set_height(self) -> None:
-        self._live.set_height(within(self._height, self._live.valid))
+        self._live.set_height(self._height.value)
 
     def _change(self, by: float) -> None:
         self._height.value = self._live.set_height(self._live.height + by)
 
     def _begin(self) -> None:
         try:
-            names: tuple[str, ...] = (chosen(self._first, self._names),)
-            if self._second.value != NOBODY:
-                names += (chosen(self._second, self._names),)
+            first, second = (chosen(h, (NOBODY, *self._names)) for h in (self._first, self._second))
+            names = (first,) if second == NOBODY else (first, second)
             self._live.begin(names, chosen(self._robot, self._robots))
         finally:
             self._show()
 
     def _settings(self) -> None:
-        values = {n: within(self._sliders[n], bounds) for n, (_, bounds, _) in _SETTINGS.items()}
+        values = {name: slider.value for name, slider in self._sliders.items()}
         self._live.set_settings(live_leg.LiveSettings(noise=self._noise.value, **values))
-
-    def _shown_names(self) -> tuple[str, str]:
-        first, *others = self._live.names
-        return first, others[0] if others else NOBODY
 
     def _show(self) -> None:
         """Bring all inputs in line with the simulation, which may have refused."""
         live = self._live
         self._height.min, self._height.max = live.valid
         self._height.value = live.height
-        self._first.value, self._second.value = self._shown_names()
+        self._first.value, self._second.value = (*live.names, NOBODY)[:2]
         self._robot.value = live.robot_name
         self._noise.value = live.settings.noise
         for name, slider in self._sliders.items():
@@ -193,7 +173,7 @@ class ReplayPanel:
             self._time.value = round(self._shown, 2)
 
     def _seek(self) -> None:
-        self._replay.seek(within(self._time, (0.0, self._replay.length)))
+        self._replay.seek(self._time.value)
         self._shown = self._replay.now
 
 

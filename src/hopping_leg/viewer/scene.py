@@ -10,7 +10,6 @@ import viser
 
 from hopping_leg.arrays import Array
 from hopping_leg.figures import COLOURS, COMMAND, controller_colours, rgb
-from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.robot import JOINTS, Robot, build_model
 from hopping_leg.viewer.tracks import Track
 
@@ -21,33 +20,22 @@ _AWAY = 1.2  # of the camera from a single leg, m
 _FIELD_OF_VIEW = math.radians(32)
 _FLOOR = (1.2, 0.5)  # half its size, m
 _RULER: Colour = (90, 96, 104)
-_AXLE: Colour = (235, 238, 242)
 
-PLAIN: Any = {"material": "toon3", "cast_shadow": False, "receive_shadow": False}
+_PLAIN: Any = {"material": "toon3", "cast_shadow": False, "receive_shadow": False}
 """Of every shape: the shading that costs least where a browser draws in software."""
-
-_HOUSINGS = ("base", "knee_cap")
-"""Spheres of the contact model that stand for motors; drawn as cylinders of the same outline."""
-
-_ACROSS = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
-"""Turns a cylinder's axis from z to y, that of the joints."""
-
 
 SECONDS = 5.0
 """Of the curves."""
 
 _GRID = np.linspace(-SECONDS, 0.0, 400)
 _LIMIT = "#9a9996"
+_LINE = {"points": {"show": False}}
 _AXIS = {
     "stroke": "#59636e",
     "font": "12px system-ui, sans-serif",
     "grid": {"width": 1},
     "ticks": {"width": 1, "size": 5},
 }
-_PHASES = ("stance", "flight", "landing")
-
-_Curve = tuple[dict[str, Any], Array]
-"""Its look and its values, (times,)."""
 
 
 def track_colours(tracks: Sequence[Track]) -> list[str]:
@@ -91,9 +79,9 @@ def _add_leg(scene: viser.SceneApi, number: int, robot: Robot, colour: Colour) -
     for tick in range(1, 17):
         x, long = (-0.086, 0.016) if tick % 2 == 0 else (-0.082, 0.008)
         size, place = (long, 0.002, 0.0016), (x, 0.027, 0.05 * tick)
-        scene.add_box(f"{name}/ruler/{tick}", _RULER, size, position=place, **PLAIN)
+        scene.add_box(f"{name}/ruler/{tick}", _RULER, size, position=place, **_PLAIN)
     command, apex = (
-        scene.add_box(f"{name}/{mark}", its, (0.26, 0.002, thick), visible=False, **PLAIN)
+        scene.add_box(f"{name}/{mark}", its, (0.26, 0.002, thick), visible=False, **_PLAIN)
         for mark, its, thick in (("command", rgb(COMMAND), 0.003), ("apex", colour, 0.002))
     )
     return _Leg(root, command, apex, *frames)
@@ -102,22 +90,18 @@ def _add_leg(scene: viser.SceneApi, number: int, robot: Robot, colour: Colour) -
 def _add_shape(
     scene: viser.SceneApi, path: str, model: mujoco.MjModel, geom: int, colour: Colour
 ) -> None:
-    name, kind, size = model.geom(geom).name, model.geom_type[geom], model.geom_size[geom]
-    red, green, blue = (int(255 * value) for value in model.mat_rgba[model.geom_matid[geom]][:3])
-    own = (red, green, blue)
-    place: Any = {"position": tuple(model.geom_pos[geom]), **PLAIN}
+    kind, size = model.geom_type[geom], model.geom_size[geom]
+    if model.geom(geom).name not in ("base", "knee_cap"):  # which stand for the motors
+        red, green, blue = (int(255 * v) for v in model.mat_rgba[model.geom_matid[geom]][:3])
+        colour = (red, green, blue)
+    place: Any = {"position": tuple(model.geom_pos[geom]), **_PLAIN}
     turned = tuple(model.geom_quat[geom])
-    if name in _HOUSINGS:
-        width = 1.1 * size[0] if name == "base" else 1.8 * size[0]
-        scene.add_cylinder(path, size[0], width, colour, wxyz=_ACROSS, **place)
-        axle = 0.35 * size[0], width + 0.008, _AXLE
-        scene.add_cylinder(f"{path}_axle", *axle, wxyz=_ACROSS, **place)
-    elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        scene.add_icosphere(path, size[0], own, **place)
+    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        scene.add_icosphere(path, size[0], colour, **place)
     elif kind == mujoco.mjtGeom.mjGEOM_BOX:
-        scene.add_box(path, own, tuple(2 * size), wxyz=turned, **place)
+        scene.add_box(path, colour, tuple(2 * size), wxyz=turned, **place)
     elif kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        scene.add_cylinder(path, size[0], 2 * size[1], own, wxyz=turned, **place)
+        scene.add_cylinder(path, size[0], 2 * size[1], colour, wxyz=turned, **place)
 
 
 def _turned(angle: float) -> Array:
@@ -138,7 +122,7 @@ def _add_floor(scene: viser.SceneApi) -> None:
     """Lay out a floor with lines every 0.1 m."""
     (x, y), thick = _FLOOR, 0.02
     slab, under = (2 * x, 2 * y, thick), (0.0, 0.0, -thick / 2)
-    scene.add_box("/floor/slab", (226, 230, 235), slab, position=under, **PLAIN)
+    scene.add_box("/floor/slab", (226, 230, 235), slab, position=under, **_PLAIN)
     above = 0.0005  # the slab, m
     lines = [((at, -y, above), (at, y, above)) for at in np.arange(-x, x + 0.05, 0.1)]
     lines += [((-x, at, above), (x, at, above)) for at in np.arange(-y, y + 0.05, 0.1)]
@@ -163,7 +147,7 @@ class Scene:
         _add_floor(scene)
 
     def show(self, tracks: list[Track], now: float, turn: int) -> None:
-        """Draw the legs at a time, s, and what has its turn: one of four plots, or the marks.
+        """Draw the legs at a time, s, and what has its turn: one of three plots, or the marks.
 
         All of them at once would cost a browser without a GPU a picture.
         """
@@ -206,57 +190,29 @@ def _plots(tracks: list[Track], time: Array) -> list[dict[str, Any]]:
     """Return all that each plot of some legs over the time, s, consists of."""
     if not tracks:
         return []
-    names, colours = [track.name for track in tracks], track_colours(tracks)
-    shown = [track.sample(time) for track in tracks]
-
-    def each(field: str, label: str = "{}", **look: Any) -> list[_Curve]:  # noqa: ANN401
-        return [
-            (_line(label.format(name), colour, **look), sample[field])
-            for name, colour, sample in zip(names, colours, shown, strict=True)
-        ]
-
-    robot = tracks[0].robot
-    command = _line("command", COMMAND, width=2, dash=(6, 4)), shown[0]["command_m"]
-    heights, tall = [command, *each("height_m")], 1.5 * robot.straight_height
-    plots = [_plot("Height / m over time / s", time, heights, (0.0, tall), 170)]
+    robot, samples = tracks[0].robot, [track.sample(time) for track in tracks]
+    tall, command = 1.5 * robot.straight_height, (COMMAND, 2.0, samples[0]["command_m"])
+    shown = [("Height / m over time / s", "height_m", (0.0, tall), [command])]
     for joint in JOINTS:
         most = getattr(robot, joint).torque_limit
-        limits = [
-            (_line(f"{side} limit", _LIMIT, width=1, dash=(4, 4)), np.full(len(time), limit))
-            for side, limit in (("upper", most), ("lower", -most))
-        ]
-        title, curves = f"{joint.capitalize()} torque / N m", limits + each(f"{joint}_torque_nm")
-        plots.append(_plot(title, time, curves, (-1.15 * most, 1.15 * most), 130))
-    for sample in shown:
-        clearance = sample["foot_clearance_m"]
-        known = np.isfinite(clearance)
-        sample["flight"] = np.where(known, 1.0 * (clearance >= FLIGHT_CLEARANCE), np.nan)
-    phases = each("flight", "{}, in the air", width=2)
-    phases += each("phase", "{}, its phase", width=1, dash=(2, 2))
-    title = "Phase: foot (solid), the controller's own (dashed)"
-    ticks = {"splits": list(range(len(_PHASES))), "values": list(_PHASES)}
-    return [*plots, _plot(title, time, phases, (-0.2, 2.2), 120, **ticks)]
-
-
-def _plot(
-    title: str,
-    time: Array,
-    curves: list[_Curve],
-    bounds: tuple[float, float],
-    height: int,
-    **axis: Any,  # noqa: ANN401
-) -> dict[str, Any]:
-    return {
-        "data": (time, *(values for _, values in curves)),
-        "series": ({}, *(line for line, _ in curves)),
-        "title": title,
-        "scales": {"x": {"time": False}, "y": {"range": bounds}},
-        "axes": ({**_AXIS, "size": 28}, {**_AXIS, "size": 62, **axis}),
-        "legend": {"show": False},
-        "height": height,
-        "padding": (4, 10, 0, 0),
-    }
-
-
-def _line(label: str, colour: str, width: float = 1.5, **more: Any) -> dict[str, Any]:  # noqa: ANN401
-    return {"label": label, "stroke": colour, "width": width, "points": {"show": False}, **more}
+        limits = [(_LIMIT, 1.0, np.full(len(time), side * most)) for side in (-1.0, 1.0)]
+        bounds = (-1.15 * most, 1.15 * most)
+        shown.append((f"{joint.capitalize()} torque / N m", f"{joint}_torque_nm", bounds, limits))
+    colours = track_colours(tracks)
+    return [
+        {
+            "data": (time, *(c[2] for c in dashed), *(sample[field] for sample in samples)),
+            "series": (
+                {},
+                *({**_LINE, "stroke": c, "width": width, "dash": (5, 4)} for c, width, _ in dashed),
+                *({**_LINE, "stroke": colour, "width": 1.5} for colour in colours),
+            ),
+            "title": title,
+            "scales": {"x": {"time": False}, "y": {"range": bounds}},
+            "axes": ({**_AXIS, "size": 28}, {**_AXIS, "size": 62}),
+            "legend": {"show": False},
+            "height": 170,
+            "padding": (4, 10, 0, 0),
+        }
+        for title, field, bounds, dashed in shown
+    ]

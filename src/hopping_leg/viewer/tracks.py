@@ -5,7 +5,7 @@ outside; scene and curves know nothing but tracks.
 """
 
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -29,9 +29,11 @@ FIELDS = (
     "hip_torque_nm",
     "knee_torque_nm",
     "foot_clearance_m",
-    "phase",
 )
-"""What a row holds beside its time; names are those of traces. ``phase`` is the controller's."""
+"""What a row holds beside its time; names are those of traces."""
+
+KEPT = round(10 * CONTROL_RATE)
+"""Rows of the past that are kept of what goes on."""
 
 _ANGLES = ("hip_position_rad", "knee_position_rad")
 _ESTIMATE = "estimated_height_m"
@@ -132,18 +134,6 @@ class Track:
         return float(np.append(np.nan, self.apexes(until))[-1])
 
 
-class DataSource(Protocol):
-    """A live simulation, a replay, or a run on the real leg."""
-
-    tracks: list[Track]  # one per leg
-    now: float  # time that is shown, s
-    notices: list[str]  # to be told; whoever shows them empties the list
-
-    def advance(self, seconds: float) -> None:
-        """Let time pass."""
-        ...
-
-
 class ReplaySource:
     """One or two traces side by side; both begin at zero.
 
@@ -208,9 +198,6 @@ def _load_leg(robot: str | None, header: dict[str, Any], path: Path) -> Robot:
     return leg
 
 
-KEPT_SECONDS = 20.0
-"""Of the past."""
-
 _LOOK = 0.5
 """Seconds between looks for a newer run."""
 
@@ -256,9 +243,9 @@ class RecorderSource:
         if self._tail is None or not len(rows):
             return
         if not self.tracks:
-            header, depth = self._tail.header, round(KEPT_SECONDS * CONTROL_RATE)
+            header = self._tail.header
             robot = _load_leg(self._robot, header, self._tail.path)
-            self.tracks = [Track(str(header.get("controller", "")), robot, depth=depth)]
+            self.tracks = [Track(str(header.get("controller", "")), robot, depth=KEPT)]
         table = pl.DataFrame(rows, schema=list(self._tail.columns), orient="row")
         self.tracks[0].extend_by_trace(Trace(table))
         self.now = float(self.tracks[0].time[-1])

@@ -10,6 +10,7 @@ import functools
 import html
 import http
 import io
+import itertools
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -18,7 +19,6 @@ from unittest.mock import patch
 from urllib.parse import urlsplit
 
 import viser
-from viser import _messages
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
@@ -30,11 +30,13 @@ from hopping_leg.viewer import live_leg, panels, scene, tracks
 _HOST = "127.0.0.1"
 _OWN = ("localhost", "127.0.0.1", "::1")
 FRAME_RATE = 60.0
-_SLOW = 6
+_SLOW = 5
 """Pictures per update of each plot and of the text; they take turns."""
 _NOTICE_SECONDS = 8.0
-_SLOW_BROWSER = "webgl-software-rendering"
-"""viser's name of its notice of a slow browser."""
+
+
+Source = live_leg.LiveSimulation | tracks.ReplaySource | tracks.RecorderSource
+"""Each has ``tracks``, the time ``now`` that is shown, s, and ``notices`` to be told."""
 
 
 class Viewer:
@@ -48,7 +50,7 @@ class Viewer:
         UsageError: There is no such port.
     """
 
-    def __init__(self, source: tracks.DataSource, *, port: int = 8080) -> None:
+    def __init__(self, source: Source, *, port: int = 8080) -> None:
         self._source = source
         self._server = _serve(port)
         self.address = f"http://{_HOST}:{self._server.get_port()}"
@@ -72,14 +74,14 @@ class Viewer:
         self._scene = scene.Scene(self._server, panel.add_tab("Last seconds"))
         panel.dock_right()
         panel.set_width(390)
-        self.frames = 0
+        self._frames = 0
         self._stopped = False
 
     def run(self, seconds: float = math.inf) -> None:
         """Simulate and show until the time is over, ``stop`` or Ctrl-C."""
         begun = last = next_at = time.monotonic()
         while last - begun < seconds and not self._stopped:
-            self._notify(self._inputs.run())
+            self._source.notices += self._inputs.run()
             now = time.monotonic()
             self._source.advance(self.clock.due(now - last))
             last = now
@@ -89,18 +91,17 @@ class Viewer:
 
     def render(self) -> None:
         """Show what is now; plots and text every few frames."""
-        source, turn = self._source, self.frames % _SLOW
+        source, turn = self._source, self._frames % _SLOW
         self._scene.show(source.tracks, source.now, turn)
         if turn == _SLOW - 1:
             self._status.content = self._text()
-            for client in self._server.get_clients().values():  # it may cover a leg at any time
-                notice = _messages.RemoveNotificationMessage(_SLOW_BROWSER)
-                client._websock_connection.queue_message(notice)
             if self._replay_panel is not None:
                 self._replay_panel.show()
-            self._notify(source.notices)
+            clients = self._server.get_clients().values()
+            for client, notice in itertools.product(clients, source.notices):
+                client.add_notification("Hopping leg", notice, auto_close_seconds=_NOTICE_SECONDS)
             source.notices.clear()
-        self.frames += 1
+        self._frames += 1
 
     def stop(self) -> None:
         """End ``run`` after the present picture; any thread may."""
@@ -110,11 +111,6 @@ class Viewer:
         """Serve no more."""
         with contextlib.redirect_stdout(io.StringIO()):
             self._server.stop()
-
-    def _notify(self, sentences: list[str]) -> None:
-        for sentence in sentences:
-            for client in self._server.get_clients().values():
-                client.add_notification("Hopping leg", sentence, auto_close_seconds=_NOTICE_SECONDS)
 
     def _text(self) -> str:
         """Return what the page says: one line per leg, and the time."""
