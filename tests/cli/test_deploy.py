@@ -170,7 +170,7 @@ EMULATE, TRANSPORT = ["emulate", "--seconds", "0"], ["doctor", "--transport"]
     ("words", "sentence"),
     [
         ([*EMULATE, "--start-pose", "x"], "There is no pose 'x'"),
-        ([*EMULATE, "--faults", "none.toml"], "no fault script none.toml"),
+        ([*EMULATE, "--faults", "none.toml"], "Cannot read the fault script none.toml"),
         ([*TRANSPORT, "/none/port"], "There is no serial port /none/port"),
         ([*TRANSPORT, "socketcn:can0"], "python-can has no interface 'socketcn'"),
     ],

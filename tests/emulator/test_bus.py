@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from moteus.fdcanusb_device import _append_checksum, _compute_crc8
 from studies.fault_campaign.wire_log import WireLog
 
-from hopping_leg.deploy.frames import Frame, crc8, padded
+from hopping_leg.deploy.frames import Frame, crc8
 from hopping_leg.emulator.bus import ReplyWriter
 from hopping_leg.emulator.ports import LineProtocol
 from tests.emulator.bench import Bench, R
@@ -30,16 +30,6 @@ def test_the_client_reads_what_was_written(register, resolution, value):
         assert read == pytest.approx(written, abs=1.0, nan_ok=True)
 
 
-def test_a_query_of_everything_is_answered_in_full(bench):
-    resolution = moteus.QueryResolution()
-    for name in ("q_current", "abs_position", "power", "motor_temperature", "home_state"):
-        setattr(resolution, name, moteus.F32)
-    resolution._extra = {R.MILLISECOND_COUNTER: moteus.INT32}
-    (result,) = bench.cycle(bench.drives[0].make_query(query_override=resolution))
-    assert {R.MODE, R.POSITION, R.ABS_POSITION, R.HOME_STATE, R.FAULT} <= set(result.values)
-    assert result.values[R.MILLISECOND_COUNTER] >= 0
-
-
 def test_unknown_registers_are_errors_between_known_ones(bench):
     registers = {0x0E: moteus.F32, 0x0F: moteus.INT8, 0x1FF: moteus.INT8}
     (result,) = bench.cycle(bench.drives[0].make_custom_query(registers))
@@ -56,17 +46,6 @@ def test_identity_is_read_as_words_and_cannot_be_written(bench):
     bench.robot.receive(Frame(0x8001, bytes([0x09, 0x81, 0x02, 1, 0, 0, 0])))
     (item,) = bench.robot.reply_queue.take(bench.robot.time)
     assert moteus.protocol.parse_registers(item.frame.data).errors == [(0x101, 2)]
-    bench.robot.receive(Frame(0x8003, b"\x11\x00"))  # for another drive
-    assert bench.robot.reply_queue.take(bench.robot.time) == []
-
-
-def test_discovery_finds_both_drives_and_a_uuid_means_one(bench):
-    found = bench.run(bench.transport.discover())
-    assert [device.can_id for device in found] == [1, 2]
-    assert found[0].uuid != found[1].uuid
-    address = moteus.DeviceAddress(uuid=found[1].uuid)
-    controller = moteus.Controller(id=address, transport=bench.transport)
-    assert bench.run(controller.custom_query({R.MODE: moteus.INT8})).id == 2
 
 
 @given(st.binary(max_size=64))
@@ -144,9 +123,3 @@ def test_endless_noise_takes_no_memory():
     for _ in range(50):
         protocol.feed(b"x" * 100)
     assert len(protocol._lines._rest) <= 512
-
-
-def test_payloads_are_padded_with_nops():
-    assert padded(b"\x01" * 9) == b"\x01" * 9 + b"\x50" * 3
-    assert padded(b"\x01" * 8) == b"\x01" * 8
-    assert len(padded(b"\x01" * 49)) == 64

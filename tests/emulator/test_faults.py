@@ -183,7 +183,7 @@ def test_a_script_is_read(tmp_path):
         ('[[fault]]\nkind = "unplug"\nphase = "noon"', "There is no fault phase 'noon'"),
         ("x = 1", "must hold tables"),
         ("[[fault", "is not valid TOML"),
-        (None, "no fault script"),
+        (None, "Cannot read the fault script"),
     ],
 )
 def test_mistakes_in_a_script_are_one_sentence(tmp_path, text, sentence):

@@ -11,16 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from moteus import multiplex
-from moteus.multiplex import FlowStreamSubframe, RegisterSubframe, StreamSubframe, SubframeType
-from moteus.protocol import Register, Writer, scale_register
+from moteus.multiplex import RegisterSubframe, StreamSubframe, SubframeType
+from moteus.protocol import Writer, scale_register
 
 from hopping_leg.deploy import frames
 from hopping_leg.emulator import diagnostic
 from hopping_leg.emulator.drive import UNKNOWN_REGISTER, EmulatedDrive
 
-_UUID_MASKS = range(Register.UUID_MASK1, Register.UUID_MASK4 + 1)
-_WORDS_ONLY = range(Register.MODEL_NUMBER, Register.UUID_MASK_CAPABLE)
-"""Registers that can be read as 32-bit integers only."""
 _MOST = 256  # Subframes that are read: a few bytes may ask for millions of registers
 _MAX_RUN = 3  # Registers whose count fits in the first byte of a subframe
 
@@ -31,8 +28,6 @@ Errors = list[tuple[int, int]]
 @functools.cache
 def _scales(register: int) -> tuple[float, ...]:
     """Return what a count is worth at 8, 16 and 32 bits, as the client knows it; 1 in integers."""
-    if register == Register.COMMAND_FIXED_CURRENT_OVERRIDE:  # of which the client knows nothing
-        register = Register.Q_CURRENT
     resolutions = (multiplex.INT8, multiplex.INT16, multiplex.INT32)
     return tuple(float(scale_register(register, each, 1)) for each in resolutions)
 
@@ -72,38 +67,12 @@ class ReplyWriter:
         self._writer.write_varuint(register)
         self._writer.write_varuint(code)
 
-    def stream(self, channel: int, data: bytes, packet: int | None = None) -> None:
-        """Add a piece of the diagnostic stream, numbered where the host asked for that."""
-        kind = multiplex.STREAM_SERVER_DATA if packet is None else multiplex.STREAM_SERVER_DATA_FLOW
-        self._buffer.write(bytes([kind]))
+    def stream(self, channel: int, data: bytes) -> None:
+        """Add a piece of the diagnostic stream."""
+        self._buffer.write(bytes([multiplex.STREAM_SERVER_DATA]))
         self._writer.write_varuint(channel)
-        if packet is not None:
-            self._buffer.write(bytes([packet]))
         self._writer.write_varuint(len(data))
         self._buffer.write(data)
-
-
-@functools.lru_cache(maxsize=16)
-def _parts(
-    data: bytes,
-) -> tuple[
-    tuple[RegisterSubframe, ...],
-    tuple[RegisterSubframe, ...],
-    tuple[StreamSubframe | FlowStreamSubframe, ...],
-]:
-    """Return a payload's writes, reads and streams; a host often says the same again."""
-    writes: list[RegisterSubframe] = []
-    reads: list[RegisterSubframe] = []
-    streams: list[StreamSubframe | FlowStreamSubframe] = []
-    with contextlib.suppress(Exception):  # the parser raises whatever a short buffer leads to
-        for s in itertools.islice(multiplex.parse_frame(data), _MOST):
-            if isinstance(s, StreamSubframe | FlowStreamSubframe):
-                streams.append(s)
-            elif isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE:
-                writes.append(s)
-            elif isinstance(s, RegisterSubframe) and s.type is SubframeType.READ:
-                reads.append(s)
-    return tuple(writes), tuple(reads), tuple(streams)
 
 
 @dataclass(frozen=True)
@@ -117,26 +86,29 @@ class Message:
     """
 
     frame: frames.Frame
-    writes: tuple[RegisterSubframe, ...]
-    reads: tuple[RegisterSubframe, ...]
-    streams: tuple[StreamSubframe | FlowStreamSubframe, ...]
+    writes: list[RegisterSubframe]
+    reads: list[RegisterSubframe]
+    streams: list[StreamSubframe]
 
     @staticmethod
+    @functools.lru_cache(maxsize=16)
     def read(frame: frames.Frame) -> "Message":
-        """Return the message of a frame."""
-        return Message(frame, *_parts(frame.data))
+        """Return the message of a frame; a host often says the same again."""
+        parts: list[object] = []
+        with contextlib.suppress(Exception):  # the parser raises whatever a short buffer leads to
+            parts.extend(itertools.islice(multiplex.parse_frame(frame.data), _MOST))
+        registers = [part for part in parts if isinstance(part, RegisterSubframe)]
+        return Message(
+            frame,
+            [part for part in registers if part.type is SubframeType.WRITE],
+            [part for part in registers if part.type is SubframeType.READ],
+            [part for part in parts if isinstance(part, StreamSubframe)],
+        )
 
     def is_for(self, drive: EmulatedDrive) -> bool:
-        """Whether it means a drive: by its id, and by its UUID or that's beginning where given."""
-        return (
-            self.frame.destination in (drive.id, frames.BROADCAST)
-            and bool(self.writes or self.reads or self.streams)
-            and all(
-                s.value == drive.identity.get(s.register - Register.UUID_MASK1 + Register.UUID1)
-                for s in self.writes
-                if s.register in _UUID_MASKS
-            )
-        )
+        """Whether it means a drive."""
+        means = self.frame.destination in (drive.id, frames.BROADCAST)
+        return means and bool(self.writes or self.reads or self.streams)
 
 
 def act(message: Message, drive: EmulatedDrive, time: float) -> Errors:
@@ -168,9 +140,6 @@ def _stream(message: Message, drive: EmulatedDrive, reply: ReplyWriter, time: fl
             continue
         if s.type is SubframeType.STREAM_CLIENT_TO_SERVER:
             drive.diagnostic.write(s.data, time)
-        elif isinstance(s, FlowStreamSubframe):
-            packet, data = drive.diagnostic.poll_flow(s.packet_number, s.data[0])
-            reply.stream(s.channel, data, packet)
         elif s.type is SubframeType.STREAM_CLIENT_POLL_SERVER:
             reply.stream(s.channel, drive.diagnostic.poll(s.data[0]))
 
@@ -182,10 +151,8 @@ def _read(message: Message, drive: EmulatedDrive, reply: ReplyWriter) -> None:
     first = resolution = 0
     for s in message.reads:
         value = state.get(s.register)
-        if value is None:
+        if value is None and (s.register not in drive.identity or s.resolution == multiplex.INT32):
             value = drive.stored(s.register)
-        if s.register in _WORDS_ONLY and s.resolution != multiplex.INT32:
-            value = None
         goes_on = run and s.register == first + len(run) and s.resolution == resolution
         if run and (value is None or not goes_on):
             reply.values(first, resolution, run)

@@ -71,14 +71,7 @@ class EmulatedDrive:
         self.uptime = 0.0
         self._brake, self.nominal_voltage = brake * 2 * math.pi, voltage
         self._commanded = False
-        settings.follow(self._take)
         self._warmth = self._velocity = self._torque = self._asked = 0.0
-
-    def _take(self, settings: Settings) -> None:
-        self._low, self._high = settings["servopos.position_min"], settings["servopos.position_max"]
-        self._timeout_mode = int(settings["servo.timeout_mode"])
-        self._max_voltage = settings["servo.max_voltage"]
-        self._fault_temperature = settings["servo.fault_temperature"]
 
     @property
     def id(self) -> int:
@@ -123,7 +116,7 @@ class EmulatedDrive:
             self.encoder.set_nearest(float(scaled))
         elif register == Register.SET_OUTPUT_EXACT:
             self.encoder.set_exact(float(scaled))
-        elif not Register.UUID_MASK1 <= register <= Register.UUID_MASK4:
+        else:
             known = register in self.state() or self.stored(register) is not None
             return NOT_WRITABLE if known else UNKNOWN_REGISTER
         return 0
@@ -157,14 +150,12 @@ class EmulatedDrive:
         """Begin one step of physics; return the torque asked of the motor's output, N m, finite."""
         self.uptime += dt * self.disturbances.clock
         self._warmth += dt / _WARMING_TIME * (_HEATING * self._amperes**2 - self._warmth)
-        position = self.encoder.position
-        outside = position < self._low or position > self._high
-        bounded = not self.command.ignore_bounds
-        if self.machine.advance(time, outside_limits=bounded and outside):
-            self.law.begin()
+        position, settings = self.encoder.position, self.settings
+        low, high = settings["servopos.position_min"], settings["servopos.position_max"]
+        self.machine.advance(time, outside_limits=position < low or position > high)
         self._check()
         self.law.notice = 0
-        wanted = self._asked = self._control(position, dt)
+        wanted = self._asked = self._control(position)
         if self.active:
             self.machine.fault = self.disturbances.notice or self.law.notice
         if math.isnan(wanted):
@@ -172,33 +163,29 @@ class EmulatedDrive:
             return 0.0
         return self.encoder.torque_to_output(wanted)
 
-    def _control(self, position: float, dt: float) -> float:
-        mode, command, law = self.machine.mode, self.command, self.law
-        velocity = self._velocity
-        if mode is DriveMode.TIMEOUT:
-            mode = DriveMode(self._timeout_mode)
-            command = torque_law.Command(mode, position=math.nan, kd_scale=command.kd_scale)
-        if mode is DriveMode.POSITION:
-            torque = law.position(command, position, velocity, dt)
-        elif mode is DriveMode.ZERO_VELOCITY:
-            torque = law.zero_velocity(command.kd_scale, velocity)
-        elif mode is DriveMode.BRAKE:
-            return -self._brake * velocity
+    def _control(self, position: float) -> float:
+        mode: int = self.machine.mode
+        if mode == DriveMode.TIMEOUT:
+            mode = int(self.settings["servo.timeout_mode"])
+            mode = DriveMode.ZERO_VELOCITY if mode == DriveMode.POSITION else mode
+        if mode == DriveMode.POSITION:
+            torque = self.law.position(self.command, position, self._velocity)
+        elif mode == DriveMode.ZERO_VELOCITY:
+            torque = self.law.zero_velocity(self.command.kd_scale, self._velocity)
         else:
-            return 0.0
-        bounds = mode in torque_law.WITH_BOUNDS and not command.ignore_bounds
-        return law.limited(torque, position, velocity, self.temperature, bounds=bounds)
+            return -self._brake * self._velocity if mode == DriveMode.BRAKE else 0.0
+        return self.law.limited(torque, position, self.temperature)
 
     def _check(self) -> None:
         """Go to fault where the firmware would."""
         machine = self.machine
         if self.disturbances.fault:
             machine.trip(self.disturbances.fault)
-        if self.voltage > self._max_voltage:
+        if self.voltage > self.settings["servo.max_voltage"]:
             machine.trip(FaultCode.OVER_VOLTAGE)
         if self.voltage < _LOWEST_VOLTAGE:
             machine.trip(FaultCode.UNDER_VOLTAGE)
-        if self.temperature > self._fault_temperature:
+        if self.temperature > self.settings["servo.fault_temperature"]:
             machine.trip(FaultCode.OVER_TEMPERATURE)
 
     def stored(self, register: int) -> float | None:
@@ -213,24 +200,16 @@ class EmulatedDrive:
 
     def true_state(self) -> dict[int, float]:
         """Return the registers that tell how the drive is, in its units."""
-        position = self.encoder.position
         return {
             Register.MODE: self.machine.mode,
-            Register.POSITION: position,
+            Register.POSITION: self.encoder.position,
             Register.VELOCITY: self._velocity,
             Register.TORQUE: self.encoder.torque_as_reported(self._torque),
             Register.Q_CURRENT: math.nan if math.isnan(self._asked) else self._amperes,
-            Register.D_CURRENT: 0.0,
-            Register.ABS_POSITION: position,
-            Register.POWER: self._torque * self._velocity * 2 * math.pi,
-            Register.MOTOR_TEMPERATURE: 0.0,
-            Register.TRAJECTORY_COMPLETE: float(math.isnan(self.command.position)),
             Register.HOME_STATE: self.encoder.home,
             Register.VOLTAGE: self.voltage,
             Register.TEMPERATURE: self.temperature,
             Register.FAULT: self.machine.fault,
-            Register.CONTROL_POSITION: self.law.control_position,
-            Register.CONTROL_VELOCITY: self.law.control_velocity,
             Register.CONTROL_TORQUE: self._asked,
             Register.MILLISECOND_COUNTER: int(self.uptime * 1000),
             Register.MULTIPLEX_ID: self.id,

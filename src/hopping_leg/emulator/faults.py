@@ -15,6 +15,7 @@ duration = 0.1
 import math
 from collections import deque
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
@@ -26,8 +27,6 @@ from hopping_leg.io import parse_toml, read_dataclass
 from hopping_leg.robot.parameters import JOINTS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from hopping_leg.emulator.drive import EmulatedDrive
     from hopping_leg.emulator.leg import EmulatedLeg
 
@@ -41,6 +40,8 @@ _PHASES = ("any", "stance", "flight", "rising", "falling", "touchdown", "apex")
 """Moments of a hop cycle."""
 
 _DRIVES = (*JOINTS, "both")
+Registers = dict[int, float]
+"""What a drive says, by register."""
 _FLIPS = 1 << 16
 _NOISE = b"@#!%\x07~ moteus?"
 
@@ -134,6 +135,7 @@ class FaultKind:
         value: Default value.
         duration: Default duration, s; NaN where a number of replies is meant.
         at_start: Whether the robot starts with it, whatever the script says of its time.
+        rises: Whether the value is a rate, at which its level rises.
     """
 
     text: ClassVar[str]
@@ -141,6 +143,7 @@ class FaultKind:
     value: ClassVar[float] = 0.0
     duration: ClassVar[float] = math.inf
     at_start: ClassVar[bool] = False
+    rises: ClassVar[bool] = False
 
     def __init_subclass__(cls, *, kind: str = "") -> None:
         if kind:
@@ -162,19 +165,27 @@ class FaultKind:
         """Those that have the fault."""
         return [self.robot.drives[joint] for joint in self.fault.joints]
 
+    def other(self, drive: "EmulatedDrive") -> "EmulatedDrive":
+        """Return the robot's other drive."""
+        return next(one for one in self.robot.drives if one is not drive)
+
     @property
     def over(self) -> bool:
         """Whether it has lasted as long as it should."""
-        lasts = self.fault.lasts
-        return self.replies_left <= 0 or (
-            not math.isnan(lasts) and self.robot.time >= self.begun + lasts
-        )
+        return self.replies_left <= 0 or self.robot.time >= self.begun + self.fault.lasts
+
+    @property
+    def level(self) -> float:
+        """What is wrong now, in the kind's unit."""
+        return self.fault.amount * (self.robot.time - self.begun if self.rises else 1.0)
 
     def begin(self) -> None:
         """Set the robot's fault when its time has come."""
 
     def update(self) -> None:
         """Change it before each step of physics."""
+        if self.rises:
+            self.begin()
 
     def end(self) -> None:
         """Reset the robot when the fault is over."""
@@ -234,7 +245,7 @@ class _EncoderJump(FaultKind, kind="encoder_jump"):
     text, unit, value = "a joint's angle is wrong from now on", "rad", 0.5
 
     def begin(self) -> None:
-        self.shift(self.fault.amount)
+        self.shift(self.level)
 
     def end(self) -> None:
         self.shift(0.0)
@@ -247,28 +258,24 @@ class _EncoderJump(FaultKind, kind="encoder_jump"):
 
 class _EncoderDrift(_EncoderJump, kind="encoder_drift"):
     text, unit, value = "a joint's angle drifts, its velocity does not", "rad/s", 0.3
-
-    def begin(self) -> None:
-        """Begin with no error."""
-
-    def update(self) -> None:
-        self.shift(self.fault.amount * (self.robot.time - self.begun))
+    rises = True
 
 
 class _Disturbance(FaultKind):
     field: ClassVar[str]
     """Of ``Disturbances``."""
+    usual: ClassVar[float] = 0.0
 
     def begin(self) -> None:
-        self.disturb(self.fault.amount)
+        self.disturb(self.level)
 
     def end(self) -> None:
-        self.disturb(0)
+        self.disturb(self.usual)
 
-    def disturb(self, amount: float) -> None:
+    def disturb(self, level: float) -> None:
         for drive in self.drives:
             kind = type(getattr(drive.disturbances, self.field))
-            setattr(drive.disturbances, self.field, kind(amount))
+            setattr(drive.disturbances, self.field, kind(level))
 
 
 class _DriveFault(_Disturbance, kind="drive_fault"):
@@ -278,13 +285,7 @@ class _DriveFault(_Disturbance, kind="drive_fault"):
 
 class _OverTemperature(_Disturbance, kind="over_temperature"):
     text, unit, value = "a drive warms up", "K/s", 40.0
-    field = "temperature"
-
-    def begin(self) -> None:
-        """Begin with no rise."""
-
-    def update(self) -> None:
-        self.disturb(self.fault.amount * (self.robot.time - self.begun))
+    field, rises = "temperature", True
 
 
 class _OverVoltage(_Disturbance, kind="over_voltage"):
@@ -292,7 +293,7 @@ class _OverVoltage(_Disturbance, kind="over_voltage"):
     field = "voltage"
 
     def begin(self) -> None:
-        self.disturb(self.fault.amount - self.drives[0].nominal_voltage)
+        self.disturb(self.level - self.drives[0].nominal_voltage)
 
 
 class _UnderVoltage(_OverVoltage, kind="under_voltage"):
@@ -309,44 +310,48 @@ class _Lie(FaultKind):
 
     def begin(self) -> None:
         for drive in self.drives:
-            drive.disturbances.report = self.lie(drive)
+            drive.disturbances.report = partial(self.said, drive)
 
     def end(self) -> None:
         for drive in self.drives:
-            drive.disturbances.report = lambda registers: registers
+            drive.disturbances.report = lambda true: true
 
-    def lie(self, drive: "EmulatedDrive") -> "Callable[[dict[int, float]], dict[int, float]]":
+    def said(self, drive: "EmulatedDrive", true: Registers) -> Registers:
         """Return what a drive says of its true registers."""
-        register, factor = self.register, self.fault.amount
-        return lambda true: {**true, register: factor * true[register]}
-
-    register: ClassVar[int] = 0
-    """Which is multiplied with the fault's value."""
-
-
-class _EncoderDead(_Lie, kind="encoder_dead"):
-    text = "a position repeats, its velocity is zero"
-
-    def lie(self, drive: "EmulatedDrive") -> "Callable[[dict[int, float]], dict[int, float]]":
-        said = {_POSITION: drive.state()[_POSITION], _VELOCITY: 0.0}
-        return lambda true: true | said
+        raise NotImplementedError
 
 
 class _SampleFrozen(_Lie, kind="sample_frozen"):
     text = "position, velocity and torque repeat"
 
-    def lie(self, drive: "EmulatedDrive") -> "Callable[[dict[int, float]], dict[int, float]]":
-        said = {register: drive.state()[register] for register in _SAMPLE}
-        return lambda true: true | said
+    def begin(self) -> None:
+        self.frozen = [self.sample(drive.state()) for drive in self.drives]
+        super().begin()
+
+    def sample(self, registers: Registers) -> Registers:
+        return {register: registers[register] for register in _SAMPLE}
+
+    def said(self, drive: "EmulatedDrive", true: Registers) -> Registers:
+        return true | self.frozen[self.drives.index(drive)]
+
+
+class _EncoderDead(_SampleFrozen, kind="encoder_dead"):
+    text = "a position repeats, its velocity is zero"
+
+    def sample(self, registers: Registers) -> Registers:
+        return {_POSITION: registers[_POSITION], _VELOCITY: 0.0}
 
 
 class _VelocityFalse(_Lie, kind="velocity_false"):
     text, unit, value = "a velocity is this many times the true one", "1", 0.5
-    register = _VELOCITY
+    register: ClassVar[int] = _VELOCITY
+
+    def said(self, drive: "EmulatedDrive", true: Registers) -> Registers:
+        return true | {self.register: self.fault.amount * true[self.register]}
 
 
-class _TorqueFalse(_Lie, kind="torque_false"):
-    text, unit, value = "a torque is reported as this many times the true one", "1", 0.0
+class _TorqueFalse(_VelocityFalse, kind="torque_false"):
+    text, value = "a torque is reported as this many times the true one", 0.0
     register = _TORQUE
 
 
@@ -354,7 +359,7 @@ class _StaleSample(_Lie, kind="stale_sample"):
     text, unit, value = "samples are older than their date says", "s", 0.01
 
     def begin(self) -> None:
-        self.past = [deque[tuple[float, dict[int, float]]]() for _ in self.drives]
+        self.past = [deque[tuple[float, Registers]]() for _ in self.drives]
         super().begin()
 
     def update(self) -> None:
@@ -364,21 +369,16 @@ class _StaleSample(_Lie, kind="stale_sample"):
             while len(past) > 1 and past[1][0] <= oldest:
                 past.popleft()
 
-    def lie(self, drive: "EmulatedDrive") -> "Callable[[dict[int, float]], dict[int, float]]":
+    def said(self, drive: "EmulatedDrive", true: Registers) -> Registers:
         past = self.past[self.drives.index(drive)]
-
-        def say(true: dict[int, float]) -> dict[int, float]:
-            return true | {r: past[0][1][r] for r in _SAMPLE} if past else true
-
-        return say
+        return true | {r: past[0][1][r] for r in _SAMPLE if past}
 
 
 class _SwappedReplies(_Lie, kind="swapped_replies"):
     text = "each drive says what the other one is like"
 
-    def lie(self, drive: "EmulatedDrive") -> "Callable[[dict[int, float]], dict[int, float]]":
-        other = next(one for one in self.robot.drives if one is not drive)
-        return lambda true: other.true_state() | {_MULTIPLEX_ID: drive.id}
+    def said(self, drive: "EmulatedDrive", true: Registers) -> Registers:
+        return self.other(drive).true_state() | {_MULTIPLEX_ID: drive.id}
 
 
 class _SameId(FaultKind, kind="same_id"):
@@ -386,16 +386,12 @@ class _SameId(FaultKind, kind="same_id"):
 
     def begin(self) -> None:
         drive = self.drives[0]
-        other = next(one for one in self.robot.drives if one is not drive)
-        drive.settings.set("id.id", str(other.id))
+        drive.settings.set("id.id", str(self.other(drive).id))
 
 
 class _FastClock(_Disturbance, kind="fast_clock"):
     text, unit, value = "a drive's clock counts so many seconds in one", "1", 1.01
-    field = "clock"
-
-    def end(self) -> None:
-        self.disturb(1)
+    field, usual = "clock", 1.0
 
 
 class _LimitNotice(_Disturbance, kind="limit_notice"):
@@ -477,8 +473,6 @@ def load_faults(path: Path) -> tuple[Fault, ...]:
     """
     try:
         content = path.read_bytes()
-    except FileNotFoundError as error:
-        raise UsageError(f"There is no fault script {path}.") from error
     except OSError as error:
         raise UsageError(f"Cannot read the fault script {path}: {error.strerror}.") from error
     tree = parse_toml(content, str(path))

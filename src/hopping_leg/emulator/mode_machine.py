@@ -15,16 +15,11 @@ from hopping_leg.deploy.drive_link import DriveMode, FaultCode
 class Notice(IntEnum):
     """Which limit is at work, in the same register; the drive goes on."""
 
-    MAX_VELOCITY = 96
-    MAX_POWER = 97
     MAX_VOLTAGE = 98
     MAX_CURRENT = 99
     FET_TEMPERATURE = 100
-    MOTOR_TEMPERATURE = 101
     MAX_TORQUE = 102
     POSITION_BOUNDS = 103
-    OTHER = 104
-    FLUX_BRAKING = 105
 
 
 BETWEEN = (DriveMode.FAULT, DriveMode.ENABLING, DriveMode.CALIBRATING, DriveMode.CALIBRATED)
@@ -41,8 +36,6 @@ _ENABLING_TIME = 0.001  # From stopped to calibrating, s
 
 STARTING_TIME = 0.0085
 """From stopped to the commanded mode, s."""
-
-_WATCHED = (DriveMode.POSITION,)
 
 
 class ModeMachine:
@@ -67,12 +60,11 @@ class ModeMachine:
         if self.mode not in (DriveMode.STOPPED, DriveMode.FAULT):
             self.mode, self.fault = DriveMode.FAULT, int(fault)
 
-    def advance(self, time: float, *, outside_limits: bool = False) -> bool:
-        """Let time pass; return whether the drive has just begun to control in another mode.
+    def advance(self, time: float, *, outside_limits: bool = False) -> None:
+        """Let time pass.
 
         ``outside_limits`` tells that position mode may not begin where the drive stands.
         """
-        before = self.mode
         if self.wanted != self.mode:
             self._change(time, outside_limits)
         if self.mode is DriveMode.ENABLING and time >= self._started + _ENABLING_TIME:
@@ -80,22 +72,17 @@ class ModeMachine:
         if self.mode is DriveMode.CALIBRATING and time >= self._started + STARTING_TIME:
             self.mode = DriveMode.CALIBRATED
             self._change(time, outside_limits)
-        if self.mode in _WATCHED and time >= self._deadline:
+        if self.mode is DriveMode.POSITION and time >= self._deadline:
             self.mode = DriveMode.TIMEOUT
         if self.mode is not DriveMode.FAULT:
             self.fault = 0
-        return (
-            self.mode is not before and self.mode in CONTROLLING and self.mode != DriveMode.TIMEOUT
-        )
 
     def _change(self, time: float, outside_limits: bool) -> None:
         if self.wanted is DriveMode.STOPPED:
             self.mode = DriveMode.STOPPED
         elif self.mode is DriveMode.STOPPED:
             self.mode, self._started = DriveMode.ENABLING, time
-        elif self.mode is DriveMode.CALIBRATED or (
-            self.mode in CONTROLLING and self.mode is not DriveMode.TIMEOUT
-        ):
+        elif self.mode is DriveMode.CALIBRATED or self.mode in CONTROLLING - {DriveMode.TIMEOUT}:
             self.mode = self.wanted
-            if self.wanted in _WATCHED and outside_limits:
+            if self.wanted is DriveMode.POSITION and outside_limits:
                 self.trip(FaultCode.START_OUTSIDE_LIMIT)

@@ -137,20 +137,17 @@ class EmulatedRobot:
 
 
 def _identity(seed: str) -> dict[int, int]:
-    """Return the registers that tell what a drive was made with: versions, serial number, UUID.
+    """Return the registers that tell what a drive was made with; the serial number is the seed's.
 
-    The seed makes serial number and UUID; two drives on a bus need different ones.
+    They can be read as 32-bit integers only.
     """
-    words = struct.unpack("<7I", hashlib.sha256(seed.encode()).digest()[:28])
-    registers: dict[int, int] = {
+    words = struct.unpack("<3I", hashlib.sha256(seed.encode()).digest()[:12])
+    return {
         Register.MODEL_NUMBER: _MODEL,
         Register.FIRMWARE_VERSION: _FIRMWARE,
         Register.REGISTER_MAP_VERSION: REGISTER_MAP,
-        Register.UUID_MASK_CAPABLE: 1,
+        **{Register.SERIAL_NUMBER + k: word & 0x7FFFFFFF for k, word in enumerate(words)},
     }
-    numbers = [Register.SERIAL_NUMBER + k for k in range(3)]
-    numbers += [Register.UUID1 + k for k in range(4)]
-    return registers | {n: word & 0x7FFFFFFF for n, word in zip(numbers, words, strict=True)}
 
 
 def _drive(robot: Robot, joint: int, configured: bool) -> EmulatedDrive:

@@ -9,6 +9,7 @@ from hopping_leg.emulator.settings import Settings
 
 _HOMED_ROTOR = 1  # Register 0x00c: known within a turn of the rotor
 _HOMED_OUTPUT = 2  # Register 0x00c: the host has told where the output is
+_RATIO, _SIGN = "motor_position.rotor_to_output_ratio", "motor_position.output.sign"
 
 
 class RotorEncoder:
@@ -18,23 +19,15 @@ class RotorEncoder:
     """
 
     def __init__(self, settings: Settings, gear_ratio: float) -> None:
-        self.gear_ratio = gear_ratio
-        self._ratio = self._sign = self._offset = 0.0
-        settings.follow(self._take)
-        self.home = _HOMED_ROTOR
-        self._rotor = self._shift = 0.0
-        self.jump = 0.0  # Turns of the rotor by which the encoder errs since a fault
-
-    def _take(self, settings: Settings) -> None:
-        self._ratio = settings["motor_position.rotor_to_output_ratio"]
-        self._sign = settings["motor_position.output.sign"]
-        self._offset = settings["motor_position.output.offset"]
+        self.gear_ratio, self._settings = gear_ratio, settings
+        self.boot(0.0)
 
     def boot(self, output: float) -> None:
         """Begin anew with the true output at a position, revolutions."""
-        self._rotor = output * self.gear_ratio
+        self.update(output)
         self._shift = -float(round(self._rotor))
-        self.jump, self.home = 0.0, _HOMED_ROTOR
+        self.jump = 0.0  # Turns of the rotor by which the encoder errs since a fault
+        self.home = _HOMED_ROTOR
 
     def shift_rotor(self, turns: float) -> None:
         """Err by turns of the rotor, as after power-up in another pose; homing is lost."""
@@ -48,27 +41,34 @@ class RotorEncoder:
     @property
     def position(self) -> float:
         """Output as the firmware reports it, revolutions."""
-        rotor = self._rotor + self._shift + self.jump
-        return self._sign * (rotor * self._ratio + self._offset)
+        rotor, settings = self._rotor + self._shift + self.jump, self._settings
+        return settings[_SIGN] * (
+            rotor * settings[_RATIO] + settings["motor_position.output.offset"]
+        )
 
     def velocity(self, output: float) -> float:
         """Return the reported velocity for a true one of the output, rev/s."""
-        return self._sign * output * self.gear_ratio * self._ratio
+        return self._settings[_SIGN] * output * self.gear_ratio * self._settings[_RATIO]
 
     def set_nearest(self, position: float) -> None:
         """Home: the output is within half a turn of the rotor of a position, revolutions."""
-        self._shift += round((position - self.position) * self._sign / self._ratio)
-        self.home = _HOMED_OUTPUT
+        self._home(round(self._turns_to(position)))
 
     def set_exact(self, position: float) -> None:
         """Home: the output is exactly at a position, revolutions."""
-        self._shift += (position - self.position) * self._sign / self._ratio
+        self._home(self._turns_to(position))
+
+    def _turns_to(self, position: float) -> float:
+        return (position - self.position) * self._settings[_SIGN] / self._settings[_RATIO]
+
+    def _home(self, turns: float) -> None:
+        self._shift += turns
         self.home = _HOMED_OUTPUT
 
     def torque_to_output(self, torque: float) -> float:
         """Return the output's true torque when the firmware believes to give ``torque``, N m."""
-        return self._sign * torque * self._ratio * self.gear_ratio
+        return self._settings[_SIGN] * torque * self._settings[_RATIO] * self.gear_ratio
 
     def torque_as_reported(self, torque: float) -> float:
         """Return what the firmware reports for a true torque of the output, N m."""
-        return self._sign * torque / (self._ratio * self.gear_ratio)
+        return self._settings[_SIGN] * torque / (self._settings[_RATIO] * self.gear_ratio)

@@ -4,10 +4,6 @@ Defaults are those of firmware for the controller board r4 with what the qdd100 
 only values that the emulator obeys are here.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable
-
 from hopping_leg.errors import UsageError, unknown_name
 
 DEFAULTS: dict[str, int | float] = {
@@ -26,15 +22,13 @@ DEFAULTS: dict[str, int | float] = {
     "servo.timeout_mode": 12,
     "servo.max_current_A": 100.0,
     "servo.derate_current_A": -20.0,
-    "servo.max_velocity": 500.0,
-    "servo.max_velocity_derate": 2.0,
     "servopos.position_min": -0.01,
     "servopos.position_max": 0.01,
 }
 """Names as in ``conf get``."""
 
 
-class Settings:
+class Settings(dict[str, int | float]):
     """One drive's configuration; changes are lost with power unless saved.
 
     What is given differs from the defaults, already in flash.
@@ -44,47 +38,31 @@ class Settings:
     """
 
     def __init__(self, **changes: float) -> None:
-        self._followers: list[Callable[[Settings], None]] = []
-        self._values = dict(DEFAULTS)
+        super().__init__(DEFAULTS)
         for name, value in changes.items():
             self.set(name, str(value))
         self.save()
 
-    def __getitem__(self, name: str) -> float:
-        return float(self._values[name])
-
-    def follow(self, take: Callable[[Settings], None]) -> None:
-        """Let somebody who asks at every step take what he needs now and after every change."""
-        self._followers.append(take)
-        take(self)
-
-    def _changed(self) -> None:
-        for take in self._followers:
-            take(self)
-
     def set(self, name: str, text: str) -> None:
         """Change a value in RAM; a ``UsageError`` tells of an unknown name or no number."""
-        if name not in self._values:
-            raise UsageError(unknown_name("drive setting", name, self._values))
-        kind = type(DEFAULTS[name])
+        if name not in self:
+            raise UsageError(unknown_name("drive setting", name, self))
         try:
-            self._values[name] = kind(float(text)) if kind is int else float(text)
-        except ValueError as error:
+            self[name] = type(DEFAULTS[name])(float(text))
+        except (ValueError, OverflowError) as error:
             raise UsageError(f"'{text}' is no value for the drive setting '{name}'.") from error
-        self._changed()
 
     def text(self, name: str) -> str:
         """Return a value as the firmware prints it."""
-        if name not in self._values:
+        if name not in self:
             raise UsageError("error reading")
-        value = self._values[name]
+        value = self[name]
         return str(value) if isinstance(value, int) else f"{value:.6f}"
 
     def save(self) -> None:
         """Write RAM to flash."""
-        self._saved = dict(self._values)
+        self._saved = dict(self)
 
     def load(self) -> None:
         """Read flash to RAM, as after power was lost."""
-        self._values = dict(self._saved)
-        self._changed()
+        self.update(self._saved)

@@ -1,6 +1,7 @@
 """From a command to the output's torque: the firmware's PD, zero velocity and limits.
 
-The integral term, trajectories, flux braking and power limits are left out.
+The integral term, trajectories, flux braking, speed and power limits are left out. A position that
+is NaN is left alone; the firmware holds the one in which the mode began.
 """
 
 import math
@@ -21,7 +22,6 @@ COMMAND_FIELDS: dict[int, str] = {
     Register.COMMAND_POSITION_MAX_TORQUE: "max_torque",
     Register.COMMAND_TIMEOUT: "timeout",
     Register.COMMAND_ILIMIT_SCALE: "ilimit_scale",
-    Register.COMMAND_IGNORE_POSITION_BOUNDS: "ignore_bounds",
 }
 """Register to the field of ``Command`` that it holds."""
 
@@ -32,7 +32,6 @@ class Command:
 
     mode: DriveMode = DriveMode.STOPPED
     position: float = 0.0
-    """NaN leaves position alone."""
     velocity: float = 0.0
     feedforward: float = 0.0
     kp_scale: float = 1.0
@@ -41,7 +40,6 @@ class Command:
     max_torque: float = 100.0
     timeout: float = 0.0
     """0 takes the configured default, NaN never times out."""
-    ignore_bounds: float = 0.0
 
 
 TORQUE_CONSTANT = 0.0275
@@ -49,99 +47,53 @@ TORQUE_CONSTANT = 0.0275
 
 
 class TorqueLaw:
-    """The position controller of one drive and the limits behind it."""
+    """The position controller of one drive and the limits behind it.
+
+    Attributes:
+        notice: Limit that was at work since it was last reset, 0 if none.
+    """
 
     def __init__(self, settings: Settings) -> None:
-        settings.follow(self._take)
-        self.begin()
-        self.notice = 0  # Limit that was at work in the last step, 0 if none
+        self._settings, self.notice = settings, 0
 
-    def _take(self, settings: Settings) -> None:
-        self._kp, self._kd = (settings[f"servo.pid_position.{gain}"] for gain in ("kp", "kd"))
-        self._timeout_torque = settings["servo.timeout_max_torque_Nm"]
-        self._max_velocity = settings["servo.max_velocity"]
-        self._velocity_derate = settings["servo.max_velocity_derate"]
-        self._amperes = settings["servo.max_current_A"]
-        self._hot_amperes = settings["servo.derate_current_A"]
-        self._margin = settings["servo.temperature_margin"]
-        self._hot = settings["servo.fault_temperature"] - self._margin
-        self._low, self._high = settings["servopos.position_min"], settings["servopos.position_max"]
-        self._derate = settings["servo.position_derate"]
-        self._ratio = settings["motor_position.rotor_to_output_ratio"]
-
-    def begin(self) -> None:
-        """Forget where the last mode was heading."""
-        self.control_position = self.control_velocity = math.nan
-
-    def position(self, command: Command, position: float, velocity: float, dt: float) -> float:
+    def position(self, command: Command, position: float, velocity: float) -> float:
         """Return the torque of position mode, N m; see the firmware's ``ISR_DoPositionCommon``."""
-        self._head_for(command, position, dt)
+        settings = self._settings
+        target = position if math.isnan(command.position) else command.position
+        rate = 0.0 if math.isnan(command.velocity) else command.velocity
         torque = command.feedforward
-        torque += self._kd * command.kd_scale * (self.control_velocity - velocity)
-        torque += self._kp * command.kp_scale * (self.control_position - position)
-        return self._within(torque, command.max_torque)
+        torque += settings["servo.pid_position.kd"] * command.kd_scale * (rate - velocity)
+        torque += settings["servo.pid_position.kp"] * command.kp_scale * (target - position)
+        return self._within(torque, command.max_torque, Notice.MAX_TORQUE)
 
     def zero_velocity(self, kd_scale: float, velocity: float) -> float:
         """Return the torque of zero-velocity mode, N m."""
-        return self._within(-self._kd * kd_scale * velocity, self._timeout_torque)
+        settings = self._settings
+        torque = -settings["servo.pid_position.kd"] * kd_scale * velocity
+        return self._within(torque, settings["servo.timeout_max_torque_Nm"], Notice.MAX_TORQUE)
 
-    def limited(
-        self, torque: float, position: float, velocity: float, temperature: float, *, bounds: bool
-    ) -> float:
+    def limited(self, torque: float, position: float, temperature: float) -> float:
         """Return the torque that the limits leave, N m; NaN passes, as in the firmware.
 
-        Position, rev, and velocity, rev/s, are the output's as reported; the temperature, degrees
-        C, is the output stage's; ``bounds`` tells whether the position limits hold.
+        The position, rev, is the output's as reported, the temperature, degrees C, the output
+        stage's.
         """
-        if bounds:
-            torque = self._in_bounds(torque, position)
-        highest, amperes = self._max_velocity, self._amperes
-        if abs(velocity) > highest and torque * velocity > 0:
-            over = (abs(velocity) - highest) / self._velocity_derate
-            torque = self._capped(torque, max(0.0, 1 - over) * amperes, Notice.MAX_VELOCITY)
-        return self._cooled(torque, amperes, temperature)
+        settings, notice = self._settings, Notice.MAX_CURRENT
+        low, high = settings["servopos.position_min"], settings["servopos.position_max"]
+        beyond = max(position - high, 0.0) if torque > 0 else max(low - position, 0.0)
+        if beyond > 0:
+            self.notice = Notice.POSITION_BOUNDS
+            torque *= max(0.0, 1 - beyond / settings["servo.position_derate"])
+        amperes, margin = settings["servo.max_current_A"], settings["servo.temperature_margin"]
+        hot = (temperature - (settings["servo.fault_temperature"] - margin)) / margin
+        if hot > 0:
+            left = amperes + hot * (settings["servo.derate_current_A"] - amperes)
+            amperes, notice = min(amperes, max(0.0, left)), Notice.FET_TEMPERATURE
+        ratio = settings["motor_position.rotor_to_output_ratio"]
+        return self._within(torque, amperes * TORQUE_CONSTANT / ratio, notice)
 
-    def _cooled(self, torque: float, amperes: float, temperature: float) -> float:
-        hot = (temperature - self._hot) / self._margin
-        if hot <= 0:
-            return self._capped(torque, amperes, Notice.MAX_CURRENT)
-        left = min(amperes, max(0.0, amperes + hot * (self._hot_amperes - amperes)))
-        return self._capped(torque, left, Notice.FET_TEMPERATURE)
-
-    def _in_bounds(self, torque: float, position: float) -> float:
-        beyond = max(position - self._high, 0.0) if torque > 0 else max(self._low - position, 0.0)
-        if not beyond > 0:
-            return torque
-        self.notice = Notice.POSITION_BOUNDS
-        return torque * max(0.0, 1 - beyond / self._derate)
-
-    def _capped(self, torque: float, amperes: float, notice: Notice) -> float:
-        return self._within(torque, amperes * TORQUE_CONSTANT / self._ratio, notice)
-
-    def _within(self, torque: float, most: float, notice: Notice = Notice.MAX_TORQUE) -> float:
+    def _within(self, torque: float, most: float, notice: Notice) -> float:
         if abs(torque) > most:
             self.notice = notice
             return math.copysign(most, torque)
         return torque
-
-    def _head_for(self, command: Command, position: float, dt: float) -> None:
-        """Move the control position: at once where one is told, else with the velocity."""
-        self.control_velocity = 0.0 if math.isnan(command.velocity) else command.velocity
-        if math.isnan(self.control_position):
-            self.control_position = position
-        if math.isnan(command.position):
-            self.control_position += self.control_velocity * dt
-        else:
-            self.control_position, command.position = command.position, math.nan
-        if not math.isnan(self._high):
-            self.control_position = min(self.control_position, self._high)
-        if not math.isnan(self._low):
-            self.control_position = max(self.control_position, self._low)
-
-
-WITH_BOUNDS = (
-    DriveMode.POSITION,
-    DriveMode.ZERO_VELOCITY,
-    DriveMode.TIMEOUT,
-)
-"""Modes in which the position limits take outward torque away."""
