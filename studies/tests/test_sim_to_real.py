@@ -22,6 +22,7 @@ from studies.sim_to_real import steps
 from studies.sim_to_real.chain import Chain, Experiment
 from studies.sim_to_real.run import Options
 from studies.sim_to_real.twins import disturbance_of, drawn_twin, find_twins, simulated
+from studies.tests.test_energy_shaping import scored_by_exponent
 
 
 def chain(folder, methods=("identified", "cad"), **options):
@@ -142,8 +143,8 @@ def test_a_twin_is_recorded_to_its_stops_and_identified_from_that_alone(tmp_path
 
 
 def test_gains_are_tuned_on_what_was_identified_and_hop_on_the_twin(tmp_path, monkeypatch):
-    brief = dataclasses.replace(steps.TUNE, generations=1, population=4, seconds=3.0)
-    monkeypatch.setattr(steps, "TUNE", brief)
+    scored_by_exponent(monkeypatch)
+    monkeypatch.setattr(steps, "TUNE", dataclasses.replace(steps.TUNE, generations=3))
     one = chain(tmp_path, ("energy-shaping", "energy-shaping-tuned"))
     for twin in one.twins:
         file = Path(one.source(twin, one.methods[1]))

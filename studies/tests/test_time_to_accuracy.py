@@ -20,6 +20,9 @@ from studies.time_to_accuracy import sb3
 from studies.time_to_accuracy.run import TimeToAccuracy, over_commands, summarise
 
 
+SHORT = TINY_FAST.replace(steps=256)
+
+
 def hops(command, error, std=0.002, count=9, skipped=0):
     return CommandResult(command, error, std, count, 2.0, 0.5, skipped, 1, 0.15)
 
@@ -92,7 +95,7 @@ def test_snapshots_of_stable_baselines3_come_at_equal_times_until_the_minutes_ar
 def tiny(monkeypatch, tmp_path):
     """Return what makes a study of small recipes in a folder; ``trained`` are their trainings."""
     monkeypatch.setattr(
-        module, "RECIPES", {"fast": TINY_FAST, "paper": TINY.replace(eval_every=400)}
+        module, "RECIPES", {"fast": SHORT, "paper": TINY.replace(eval_every=400)}
     )
     monkeypatch.setattr(module, "SHARES", {"fast": (0.5, 1.0)})
     try_briefly(monkeypatch)
@@ -115,7 +118,7 @@ def tiny(monkeypatch, tmp_path):
 
 
 def test_a_distillation_is_trained_anew_for_every_share_once_and_goes_on_if_killed(tiny, tmp_path):
-    steps = TINY_FAST.schedule.steps
+    steps = SHORT.schedule.steps
     tiny.killed_after = 1
     with pytest.raises(KeyboardInterrupt):
         tiny("fast")
