@@ -1,9 +1,7 @@
 """Run the study: ``python -m studies.energy_shaping --help``."""
 
-import sys
-
 from studies.energy_shaping.run import Baseline
 from studies.shared import main
 
 if __name__ == "__main__":
-    sys.exit(main("energy_shaping", Baseline))
+    raise SystemExit(main("energy_shaping", Baseline))

@@ -42,8 +42,6 @@ class PhysicsStep:
     """Of a run, s."""
     seed: int = 0
     """Of noise and delay, the same at every step."""
-    threads: int = 0
-    """Threads of the physics, 0 for all cores; results do not depend on it."""
     json: JsonFile = None
 
     def measure(self) -> Row:
@@ -80,7 +78,7 @@ class PhysicsStep:
         return result
 
     def _rows(self, name: str, robot: Robot, step: float) -> list[Row]:
-        setup = RolloutConfig(robot, timestep=step, threads=self.threads)
+        setup = RolloutConfig(robot, timestep=step)
         commands = np.repeat(self.commands, self.repeats)
         ticks = round(self.duration * setup.rate)
         controller = load_controller(name, robot)

@@ -1,9 +1,7 @@
 """Run the study: ``python -m studies.sim_to_real --help``."""
 
-import sys
-
 from studies.shared import main
 from studies.sim_to_real.run import Options
 
 if __name__ == "__main__":
-    sys.exit(main("sim_to_real", Options))
+    raise SystemExit(main("sim_to_real", Options))

@@ -1,10 +1,8 @@
 """Run a part of the study: ``python -m studies.speed --help``."""
 
-import sys
-
 from studies.shared import main
 from studies.speed.deploy import Deploy
 from studies.speed.env import Env
 
 if __name__ == "__main__":
-    sys.exit(main("speed", Env | Deploy))
+    raise SystemExit(main("speed", Env | Deploy))

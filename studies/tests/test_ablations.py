@@ -83,14 +83,6 @@ def test_a_variant_is_summed_up_over_seeds_its_worst_height_being_that_of_any():
     assert second["runs"] == 1
 
 
-def test_a_student_hops_alone_after_the_first_rollout_without_help():
-    made = learner(TINY_FAST.replace(VARIANTS["no-help"][1]))
-    shares = []
-    made.on_boundary = lambda: shares.append(made.mixing)
-    learn(made, 3 * ROLLOUT)
-    assert shares == [1, 0, 0]
-
-
 @pytest.fixture(scope="module")
 def teachers():
     """Return two teachers of one seed and one of another."""
@@ -120,28 +112,3 @@ def test_refinement_begins_at_the_students_weights_and_leaves_them():
     for ours, theirs, later in zip(begun, student, gone_on, strict=True):
         np.testing.assert_allclose(ours, theirs, atol=1e-6)
         assert not np.allclose(later, theirs, atol=1e-6)
-
-
-def test_the_actor_sees_its_own_inputs_alone_and_the_critic_the_others():
-    split = ppo._Split(5, 12, [8, 8])
-    seen, other = torch.randn(3, 12), torch.randn(3, 12)
-    other[:, :5] = seen[:, :5]
-    assert torch.equal(split.forward_actor(seen), split.forward_actor(other))
-    assert not torch.equal(split.forward_critic(seen), split.forward_critic(other))
-    changed = torch.cat([torch.randn(3, 5), seen[:, 5:]], dim=1)
-    assert torch.equal(split.forward_critic(seen), split.forward_critic(changed))
-
-
-def test_an_episode_of_a_teacher_ends_in_the_state_in_which_it_was():
-    env = ppo._TrueState(ppo._task(TINY_FAST.replace({"task.episode": 0.05}), ROBOT, 0))
-    assert env.reset().shape == (TINY_FAST.schedule.num_envs, *env.observation_space.shape)
-    ended = 0
-    for _ in range(12):
-        before = env.task.privileged().copy()
-        seen, _, done, infos = env.step(np.zeros((env.num_envs, 2), np.float32))
-        for leg in np.flatnonzero(done):
-            last = infos[leg]["terminal_observation"]
-            assert last.shape == env.observation_space.shape
-            assert np.abs(last[:-2] - before[leg]).max() < np.abs(last - seen[leg]).max()
-            ended += 1
-    assert ended >= env.num_envs

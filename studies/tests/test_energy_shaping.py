@@ -30,7 +30,7 @@ SETUP = RolloutConfig(ROBOT, threads=1)
 def measured(monkeypatch, *names):
     some = [case for case in cases(ROBOT) if case.name in names]
     monkeypatch.setattr(module, "cases", lambda _: some)
-    return Baseline(ROBOT.name, runs=2, duration=6.0, threads=1).measure()
+    return Baseline(ROBOT.name, runs=2, duration=4.0).measure()
 
 
 def test_every_case_is_another():
@@ -136,14 +136,11 @@ def test_the_command_writes_gains_that_say_how_they_were_found(tmp_path, monkeyp
     scored_by_exponent(monkeypatch)
     words = ["--robot", "legv2", "--generations", "1", "--population", "4", "--out", str(tmp_path)]
     assert main("energy_shaping.tune", Tune, [*words, "--json", str(tmp_path / "t.json")]) == 0
-    found, stored = (
-        json.loads((tmp_path / "t.json").read_text()),
-        load_gains(tmp_path / "gains.toml"),
-    )
+    found = json.loads((tmp_path / "t.json").read_text())
+    stored = load_gains(tmp_path / "gains.toml")
     assert vars(stored.gains) == pytest.approx(found["gains"])
     assert stored.robot == "legv2"
     assert "energy_shaping.tune --robot legv2 --generations 1" in stored.source
-    assert main("energy_shaping.tune", Tune, ["--commands", "0.2", "0.3"]) == 2
 
 
 def test_gains_survive_a_file_and_a_bad_one_is_named(tmp_path):

@@ -36,8 +36,7 @@ def test_a_policy_hops_on_its_own_robot_alone():
 
 def test_energy_shaping_hops_alike_at_both_steps():
     study = PhysicsStep(
-        ("energy-shaping",), ("legv2-paper",), (0.3,), 5e-4, halvings=1, repeats=3, duration=4,
-        threads=1,
+        ("energy-shaping",), ("legv2-paper",), (0.3,), 5e-4, halvings=1, repeats=3, duration=4
     )  # fmt: skip
     result = study.measure()
     coarse, fine = result["rows"]

@@ -3,13 +3,11 @@
 import numpy as np
 import pytest
 
-from hopping_leg.controllers.registry import load_controller
-from hopping_leg.controllers.rollout import RolloutConfig, rollout
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import GRAVITY, load_robot
-from hopping_leg.sim import NO_NOISE, LegSimulator
+from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.mujoco_simulator import MujocoSimulator
-from tests.sim.legs import POSTURE, STEP, with_joints
+from tests.sim.legs import POSTURE, with_joints
 
 PAPER = load_robot("legv2-paper")
 KINDS = {"stepper": LegSimulator, "mujoco": MujocoSimulator}
@@ -36,23 +34,6 @@ def tight(spec):
     spec.option.tolerance, spec.option.iterations = 1e-15, 200
 
 
-def hops(engine, robot, ticks=400):
-    """Return heights of what energy shaping does at two commands in an engine.
-
-    The legs fall a little first: whether a foot at zero distance touches is up to rounding.
-    """
-    config = RolloutConfig(robot=robot, disturbance=NO_NOISE, timestep=STEP, threads=1)
-    legs = KINDS[engine](robot, 2, timestep=STEP, threads=1)
-    commands = np.tile([0.28, 0.33], (ticks, 1))
-    controller = load_controller("energy-shaping", robot)
-
-    def drop(legs):
-        legs.stand(slice(None), POSTURE, 0.01)
-
-    controller.watch = drop
-    return rollout(controller, config, commands, 0, legs=legs).data["height_m"]
-
-
 @pytest.mark.parametrize("engine", KINDS)
 def test_what_became_unstable_stays_so_and_its_neighbour_goes_on(engine):
     alone, legs = (KINDS[engine](PAPER, count, threads=1) for count in (1, 2))
@@ -64,15 +45,6 @@ def test_what_became_unstable_stays_so_and_its_neighbour_goes_on(engine):
         legs.step(np.zeros((2, 2)))
     assert not np.isfinite(legs.state[0]).all()
     np.testing.assert_array_equal(legs.q[1], alone.q[0])
-
-
-def test_energy_shaping_hops_as_in_the_stepper():
-    """Contacts amplify what MuJoCo's tolerance leaves of a difference."""
-    one, other = (hops(engine, CAD) for engine in ("mujoco", "stepper"))
-    assert np.abs(one - other)[:200].max() < 1e-4
-    assert np.abs(one - other).max() < 1e-3
-    apexes = (np.diff(np.sign(np.diff(other, axis=0)), axis=0) < 0).sum(axis=0)
-    assert apexes.min() >= 3
 
 
 def test_motor_line_gain_load_friction_and_pushes_are_the_steppers():

@@ -9,6 +9,7 @@ from mujoco import batch
 
 from hopping_leg.robot import JOINTS, DriveMismatch, get_spec, kinematics, load_robot
 from hopping_leg.sim import LegSimulator, leg_physics
+from hopping_leg.sim.compiled import compiled
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, Range, sample
 from tests.sim.legs import with_joints, with_reality, with_strong_motors
 
@@ -223,6 +224,12 @@ def random_matrix(rng):
     return tuple(matrix[np.triu_indices(3)])
 
 
+@compiled
+def acceleration(m, force, friction, rows, count, start):
+    """Return the same as the function that is compiled into others; kept between sessions."""
+    return leg_physics.constrained_acceleration(m, force, friction, rows, count, start)
+
+
 @given(SEEDS, st.integers(0, leg_physics.ROWS), st.integers(0, 7))
 @settings(max_examples=300)
 def test_the_acceleration_obeys_gauss_principle(seed, count, sliding):
@@ -235,7 +242,7 @@ def test_the_acceleration_obeys_gauss_principle(seed, count, sliding):
     rows[:count] = rng.normal(0, 1, (count, 5)) * [1, 1, 1, 100, 0]
     rows[:count, 4] = 10 ** rng.uniform(-1, 3, count)
     friction = tuple(map(tuple, (loss, stiff, rest, loss / stiff)))
-    a = leg_physics.constrained_acceleration(m, tuple(force), friction, rows, count, tuple(start))
+    a = acceleration(m, tuple(force), friction, rows, count, tuple(start))
     miss = np.minimum(rows[:count, :3] @ a - rows[:count, 3], 0.0)
     given_by_rows = -(rows[:count, 4] * miss) @ rows[:count, :3]
     given_by_friction = np.clip(-stiff * (a - rest), -loss, loss)
