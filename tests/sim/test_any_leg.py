@@ -3,9 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from hopping_leg.errors import UsageError
 from hopping_leg.robot import NO_MISMATCH, Latency, check_physics, doubts, load_robot
 from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.any_leg import SIZES, draw_any_leg, draw_leg
@@ -26,8 +24,6 @@ def test_a_drawn_leg_is_a_robot_file_without_doubts(tmp_path):
             part, name = spread.path.split(".")
             factor = getattr(getattr(drawn.robot, part), name) / getattr(getattr(LEG, part), name)
             assert 0.999 * spread.low <= factor <= 1.001 * spread.high
-    with pytest.raises(UsageError, match="-1"):
-        draw_leg(-1)
 
 
 def test_legs_of_a_training_can_be_and_follow_from_their_seeds():

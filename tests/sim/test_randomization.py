@@ -141,5 +141,3 @@ def test_every_number_lies_in_its_range_and_fills_it():
 def test_what_cannot_be_drawn_is_refused(low, high, scale):
     with pytest.raises(UsageError, match=r"hip\.friction"):
         Range("hip.friction", "N m", low, high, "[C]", scale)
-    with pytest.raises(UsageError, match="seed of -1"):
-        draw_twin(-1)

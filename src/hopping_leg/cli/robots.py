@@ -115,6 +115,7 @@ def _draw(args: Draw) -> None:
     from hopping_leg.sim.randomization import draw_twin
 
     at_least(1, count=args.count)
+    at_least(0, seed=args.seed)
     draw = draw_twin if args.kind == "twins" else draw_leg
     for seed in range(args.seed, args.seed + args.count):
         drawn = draw(seed)

@@ -136,17 +136,12 @@ class Card:
 
     def __post_init__(self) -> None:
         bounds = {len(self.input_low), len(self.input_high)}
-        for name, holds in (
-            ("rate", 1 <= self.rate <= _MOST_RATE),
-            ("command_low", 0 < self.command_low <= self.command_high),
-            ("torque_scale", min(self.torque_scale) > 0),
-            ("input_low", bounds in ({0}, {len(INPUTS)}) and self.input_low <= self.input_high),
-        ):
-            if not holds:
-                raise PolicyError(
-                    f"'{name}' of its card is {getattr(self, name)}, which no policy has; export"
-                    " the policy again."
-                )
+        commands = 0 < self.command_low <= self.command_high and min(self.torque_scale) > 0
+        inputs = bounds in ({0}, {len(INPUTS)}) and self.input_low <= self.input_high
+        if not (1 <= self.rate <= _MOST_RATE and commands and inputs):
+            raise PolicyError(
+                "A policy's card holds numbers that none has; export the policy again."
+            )
 
     def to_json(self) -> str:
         """Return the card as stored in the file."""

@@ -27,8 +27,6 @@ from hopping_leg.errors import ControllerError, HoppingLegError, unknown_name
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.channel import Measurement
 
-METHOD = "get_control_output"  # of a controller of one leg
-
 
 class SingleLeg:
     """Gives every leg a controller of its own, made at every reset, at a period in s."""
@@ -53,7 +51,7 @@ class SingleLeg:
 
 
 class UserController:
-    """Guards a controller of someone else, named ``origin``; implements ``Controller``.
+    """Guards a controller named ``origin``; implements ``Controller``.
 
     ``digest`` tells it from others of its name.
     """
@@ -111,15 +109,14 @@ def load_user_controller(name: str, robot: Robot, rate: float) -> UserController
     with guarded(name, f"could not be made as {name.rpartition(':')[2]}(robot, rate={rate:g})"):
         controller = kind(robot, rate=rate)
     named = getattr(controller, "name", None)
-    if hasattr(controller, METHOD) and not hasattr(controller, "act"):
+    if hasattr(controller, "get_control_output") and not hasattr(controller, "act"):
         controller = SingleLeg(lambda: kind(robot, rate=rate), 1 / rate)
-    if not all(callable(getattr(controller, method, None)) for method in ("reset", "act")):
+    if not (hasattr(controller, "reset") and hasattr(controller, "act")):
         raise ControllerError(
-            f"'{name}' is no controller, which has the methods 'reset' and 'act', or '{METHOD}' for"
-            " a single leg."
+            f"'{name}' is no controller, which has the methods 'reset' and 'act', or"
+            " 'get_control_output' for a single leg."
         )
-    file = getattr(module, "__file__", None)
-    content = Path(file).read_bytes() if file else module.__name__.encode()
+    content = Path(module.__file__).read_bytes() if module.__file__ else b""
     return UserController(controller, name, named, hashlib.sha256(content).hexdigest()[:16])
 
 

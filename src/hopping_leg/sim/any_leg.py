@@ -14,7 +14,6 @@ from operator import attrgetter
 
 import numpy as np
 
-from hopping_leg.errors import UsageError
 from hopping_leg.io import Tree, replace_at
 from hopping_leg.robot import (
     JOINTS,
@@ -161,13 +160,7 @@ class AnyLeg:
 
 
 def draw_leg(seed: int) -> Twin:
-    """Draw a leg of any size whose file tells all of it; the same seed gives the same leg.
-
-    Raises:
-        UsageError: The seed is negative.
-    """
-    if seed < 0:
-        raise UsageError(f"A seed of {seed} has no meaning; give 0 or more.")
+    """Draw a leg of any size whose file tells all of it; the same seed gives the same leg."""
     rng, base = np.random.default_rng([seed, 0]), _base()
     robot = _within_drives(_draw(_scale(base, rng), (*GROUND, *FRICTION), rng))
     tree: Tree = {"name": f"leg-{seed}", "description": f"leg {seed}, drawn"}

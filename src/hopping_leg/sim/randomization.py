@@ -258,10 +258,7 @@ def draw_twin(seed: int, base: str = "legv2", ranges: Sequence[Range] = TWIN_RAN
 
     Raises:
         RobotError: There is no such robot, or a drawn number contradicts it.
-        UsageError: The seed is negative.
     """
-    if seed < 0:
-        raise UsageError(f"A seed of {seed} has no meaning; give 0 or more.")
     rng = np.random.default_rng(seed)
     parent = base if base in shipped_robots() else str(Path(base).resolve())
     description = f"twin {seed} of {Path(base).stem}, drawn"
