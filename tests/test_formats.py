@@ -24,12 +24,12 @@ from hopping_leg.formats import to_mcap
 JOINTS = [c for of in COLUMNS.values() for triple in of.values() for c in triple if c]
 
 
-def noise(rows=40, seed=0, rate=200.0, robot="legv2", command=0.3):
+def noise():
     """Return a trace of random numbers, all columns there."""
-    rng = np.random.default_rng(seed)
-    columns = {name: rng.normal(size=rows) for name in TRACED}
-    columns |= {"time_s": np.arange(rows) / rate, "command_m": np.full(rows, command)}
-    header = {"robot": robot, "robot_digest": load_robot(robot).digest, "rate_hz": rate}
+    rng = np.random.default_rng(0)
+    columns = {name: rng.normal(size=40) for name in TRACED}
+    columns |= {"time_s": np.arange(40) / 200.0, "command_m": np.full(40, 0.3)}
+    header = {"robot": "legv2", "robot_digest": load_robot("legv2").digest, "rate_hz": 200.0}
     return Trace(pl.DataFrame(columns), header)
 
 
@@ -68,27 +68,22 @@ def test_samples_and_times_come_back_as_they_were(seed, rows, tmp_path_factory):
         np.testing.assert_array_equal(back[column], values)
 
 
-def test_other_readers_open_the_file_and_find_the_same_samples(tmp_path):
+def test_another_reader_opens_the_file_and_finds_the_same_samples(tmp_path):
     from mcap.reader import make_reader
     from mcap_ros2.decoder import DecoderFactory
-    from rosbags.highlevel import AnyReader
 
     trace = noise()
-    path = written(tmp_path, trace)
-    reader = make_reader(io.BytesIO(path.read_bytes()), decoder_factories=[DecoderFactory()])
+    content = io.BytesIO(written(tmp_path, trace).read_bytes())
+    reader = make_reader(content, decoder_factories=[DecoderFactory()])
     assert reader.get_header().profile == "ros2"
-    theirs = [m for _, c, _, m in reader.iter_decoded_messages(topics=["/joint_states"])]
-    with AnyReader([path]) as bag:
-        wanted = [c for c in bag.connections if c.topic == "/joint_states"]
-        ours = [bag.deserialize(raw, c.msgtype) for c, _, raw in bag.messages(wanted)]
-        kinds = {c.topic: c.msgtype for c in bag.connections}
+    messages = [m for _, c, _, m in reader.iter_decoded_messages(topics=["/joint_states"])]
+    kinds = {c.topic: s.name for s, c, _, _ in reader.iter_decoded_messages()}
     assert kinds["/joint_commands"] == JOINT_STATE
     assert kinds["/foot_clearance_m"] == "std_msgs/msg/Float64"
-    for messages in (theirs, ours):
-        assert [m.name for m in messages] == [["rail", "hip", "knee"]] * 40
-        for joint, column in enumerate(["height_m", "hip_position_rad", "knee_position_rad"]):
-            assert [m.position[joint] for m in messages] == trace.column(column).tolist()
-        assert [m.header.stamp.nanosec for m in messages] == [5_000_000 * k for k in range(40)]
+    assert [m.name for m in messages] == [["rail", "hip", "knee"]] * 40
+    for joint, column in enumerate(["height_m", "hip_position_rad", "knee_position_rad"]):
+        assert [m.position[joint] for m in messages] == trace.column(column).tolist()
+    assert [m.header.stamp.nanosec for m in messages] == [5_000_000 * k for k in range(40)]
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
@@ -186,22 +181,12 @@ def record(path, storage, *tables, start=0, topic=None, joints=("hip", "knee")):
                         bag.write(connection, stamp, types.serialize_cdr(filled, JOINT_STATE))
 
 
-@pytest.fixture
-def trace(tmp_path):
-    path = tmp_path / "run.parquet"
-    noise(robot="legv2").save(path)
-    return path
-
-
-def test_a_file_lies_beside_its_trace_or_in_a_folder(trace, tmp_path):
-    assert main(["export", "traces", str(trace)]) == 0
+def test_a_file_lies_beside_its_trace_or_in_a_folder_and_a_missing_extra_is_named(tmp_path):
+    words = ["export", "traces", str(tmp_path / "run.parquet")]
+    noise().save(tmp_path / "run.parquet")
+    assert main(words) == main([*words, "--out", str(tmp_path / "out")]) == 0
     assert (tmp_path / "run.mcap").stat().st_size > 1000
-    assert main(["export", "traces", str(trace), "--out", str(tmp_path / "out")]) == 0
     assert (tmp_path / "out/run.mcap").exists()
-
-
-def test_a_missing_extra_is_named_with_the_command_that_installs_it(trace):
-    words = ["export", "traces", str(trace)]
     code = f"from hopping_leg.cli import main; sys.exit(main({words}))"
     found = run_without(("mcap", "mcap_ros2"), code)
     assert found.returncode == 2

@@ -21,7 +21,7 @@ CEILINGS = {
     "src/hopping_leg/sim/**/*.py": (12, 2410),
     "src/hopping_leg/viewer/**/*.py": (6, 1140),
     "src/**/*.py": (182, 28570),
-    "tests/**/*.py": (139, 15560),
+    "tests/**/*.py": (138, 15470),
     "studies/**/*.py": (79, 8120),
     "docs/**/*.md": (22, 2500),
     "docs/live/*.js": (13, 1490),

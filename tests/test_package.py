@@ -19,20 +19,14 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 LARGEST = 1_000_000
 
 
-@pytest.fixture(scope="module")
-def archive(tmp_path_factory):
-    """Size of every file in the source archive, by path."""
-    folder = tmp_path_factory.mktemp("sdist")
-    command = [sys.executable, "-m", "build", "--sdist", "--no-isolation", "--outdir", folder, ROOT]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    (file,) = folder.iterdir()
-    with tarfile.open(file) as content:
-        return {m.name.partition("/")[2]: m.size for m in content.getmembers() if m.isfile()}
-
-
 @pytest.mark.slow
-def test_the_source_archive_holds_what_is_installed_and_what_is_to_be_read(archive):
+def test_the_source_archive_holds_what_is_installed_and_read_nothing_large_and_no_run(tmp_path):
+    command = [sys.executable, "-m", "build", "--sdist", "--no-isolation"]
+    done = subprocess.run([*command, "--outdir", tmp_path, ROOT], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    (file,) = tmp_path.iterdir()
+    with tarfile.open(file) as content:
+        archive = {m.name.partition("/")[2]: m.size for m in content.getmembers() if m.isfile()}
     package = Path(hopping_leg.__file__).parent
     inside = {
         f"src/hopping_leg/{path.relative_to(package)}"
@@ -46,10 +40,6 @@ def test_the_source_archive_holds_what_is_installed_and_what_is_to_be_read(archi
     read |= {str(path.relative_to(ROOT)) for path in (ROOT / "studies").rglob("*.py")}
     examples = {f"examples/{path.name}" for path in (ROOT / "examples").glob("*.*")}
     assert not (inside | read | examples) - set(archive)
-
-
-@pytest.mark.slow
-def test_the_source_archive_holds_nothing_large_and_no_run(archive):
     assert not {name: size for name, size in archive.items() if size > LARGEST}
     top = {name.partition("/")[0] for name in archive}
     assert not top & {"runs", "build", "site", ".venv", "MUJOCO_LOG.TXT"}
@@ -72,14 +62,9 @@ def test_the_installed_version_is_the_projects_and_is_in_the_changelog():
     assert f"## {PROJECT['version']}" in (ROOT / "CHANGELOG.md").read_text()
 
 
-def test_the_citation_is_complete_and_of_this_version():
+def test_the_citation_is_of_this_version():
     yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
-    assert citation["cff-version"] == "1.2.0"
     assert citation["version"] == PROJECT["version"]
     assert citation["license"] == PROJECT["license"]
-    assert {"title", "message", "authors"} <= citation.keys()
-    paper = citation["preferred-citation"]
-    assert {"type", "title", "authors", "year", "doi"} <= paper.keys()
-    assert all({"given-names", "family-names"} <= author.keys() for author in paper["authors"])
-    assert paper["doi"] in (ROOT / "README.md").read_text()
+    assert citation["preferred-citation"]["doi"] in (ROOT / "README.md").read_text()

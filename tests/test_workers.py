@@ -13,7 +13,8 @@ import pytest
 
 from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.workers import ProcessWorkers, RayWorkers, map_rows
-from tests.clusters import NONE, local, two_machines
+
+NONE = "Ray is not installed (extra 'cluster')"
 
 
 def blow_up(number):
@@ -103,17 +104,19 @@ def wait_for(happened):
 
 
 @pytest.mark.slow
-def test_a_cluster_does_the_same_and_a_worker_that_dies_begins_again(tmp_path):
-    with local():
-        cluster = RayWorkers("local")
-        check_contract(cluster)
+def test_a_cluster_of_two_machines_does_the_same_and_a_worker_that_dies_begins_again(tmp_path):
+    ray = pytest.importorskip("ray", reason=NONE)
+    from ray.cluster_utils import Cluster
+
+    ray.shutdown()
+    machines = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    machines.add_node(num_cpus=1)
+    try:
+        check_contract(RayWorkers(machines.address))
         assert RayWorkers().map(die_once, [(tmp_path / "mark",)]) == ["lived"]
-
-
-@pytest.mark.slow
-def test_an_address_is_joined():
-    with two_machines() as address:
-        assert RayWorkers(address).count == 2
+    finally:
+        ray.shutdown()
+        machines.shutdown()
 
 
 @pytest.mark.parametrize("address", ["127.0.0.1:1", "ray://127.0.0.1:1"])
