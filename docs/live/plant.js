@@ -19,7 +19,7 @@ export const RANDOM = {
   )),
 };
 
-export class SimulatedLeg {
+class SimulatedLeg {
   constructor(robot, settings, draws) {
     this.robot = robot;
     this.draws = draws;
@@ -120,7 +120,6 @@ class Channel {
   // Return the torques that reach the motors, N m; ends the tick.
   actuate(torque) {
     this.tick += 1;
-    if (this.tick === 1e9) this.tick = 0; // a whole multiple of the depth
     if (this.quiet) return torque;
     return torque.map((t, i) => t * (1 + DATA.noise.torque_noise * (2 * this.drawn[6 + i] - 1)));
   }
@@ -151,13 +150,12 @@ export class Plant {
 
   // Apply joint torques for one control period; return what the motors gave, N m.
   drive(torque) {
-    const { stiffness, damping, inset, replace } = DATA.soft_limits;
+    const { stiffness, damping } = DATA.soft_limits;
     const asked = JOINTS.map((name, i) => {
       const angle = this.seen.samples[0][i];
       const back = clamp(angle, this.leg.robot[name].lower, this.leg.robot[name].upper) - angle;
       if (back === 0) return torque[i];
-      const pull = stiffness * (back + Math.sign(back) * inset);
-      return pull - damping * this.seen.samples[0][2 + i] + (replace ? 0 : torque[i]);
+      return torque[i] + stiffness * back - damping * this.seen.samples[0][2 + i];
     });
     return this.leg.step(this.channel.actuate(asked));
   }

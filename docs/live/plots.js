@@ -1,7 +1,7 @@
 // Curves of the last seconds on a canvas: heights with apexes, motors' torques at the joints.
 
 import { PERIOD } from "live/data.js";
-import { sharpContext } from "live/scene.js";
+import { disc, line, sharpContext } from "live/scene.js";
 
 const SECONDS = 5;
 const LEFT = 40;
@@ -56,14 +56,9 @@ function grid(context, colours, { title, low, high, step = high }, x, y, from) {
   context.fillStyle = colours.ink;
   context.fillText(title, LEFT, from + 22);
   context.fillStyle = colours.soft;
-  context.strokeStyle = colours.line;
-  context.lineWidth = 1;
   context.textAlign = "right";
   for (let value = low; value <= high + 1e-9; value += step) {
-    context.beginPath();
-    context.moveTo(x(SECONDS), y(value));
-    context.lineTo(x(0), y(value));
-    context.stroke();
+    line(context, colours.line, 1, [x(SECONDS), y(value)], [x(0), y(value)]);
     const text = value.toFixed(step < 1 ? 1 : 0).replace("-", "\u2212");
     context.fillText(text, LEFT - 6, y(value) + 4);
   }
@@ -71,22 +66,13 @@ function grid(context, colours, { title, low, high, step = high }, x, y, from) {
 }
 
 function curve(context, past, column, colour, x, y) {
-  context.strokeStyle = colour;
-  context.lineWidth = 1.6;
-  context.beginPath();
-  const first = Math.max(past.length - Math.round(SECONDS / PERIOD) - 1, 0);
-  for (let i = first; i < past.length; i++) {
-    context.lineTo(x((past.length - 1 - i) * PERIOD), y(past[i][column]));
-  }
-  context.stroke();
+  const last = past.slice(-Math.round(SECONDS / PERIOD) - 1);
+  const points = last.map((row, i) => [x((last.length - 1 - i) * PERIOD), y(row[column])]);
+  line(context, colour, 1.6, ...points);
 }
 
 function dots(context, past, colour, x, y) {
-  context.fillStyle = colour;
   past.forEach(([, , , , apex], i) => {
-    if (Number.isNaN(apex)) return;
-    context.beginPath();
-    context.arc(x((past.length - 1 - i) * PERIOD), y(apex), 3.5, 0, 2 * Math.PI);
-    context.fill();
+    if (!Number.isNaN(apex)) disc(context, colour, [x((past.length - 1 - i) * PERIOD), y(apex)], 3.5);
   });
 }

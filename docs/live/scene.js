@@ -26,7 +26,7 @@ export function pageColours() {
   return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }
 
-function line(context, colour, width, ...points) {
+export function line(context, colour, width, ...points) {
   context.strokeStyle = colour;
   context.lineWidth = width;
   context.beginPath();
@@ -34,7 +34,7 @@ function line(context, colour, width, ...points) {
   context.stroke();
 }
 
-function disc(context, colour, [x, y], radius) {
+export function disc(context, colour, [x, y], radius) {
   context.fillStyle = colour;
   context.beginPath();
   context.arc(x, y, radius, 0, 2 * Math.PI);

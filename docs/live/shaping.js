@@ -12,9 +12,9 @@ const PUSH_LIMIT = 0.4; // longest phases, s
 const FLIGHT_LIMIT = 0.5;
 const BRAKE_LIMIT = 0.25;
 const MEMORY = 3; // ticks that a touchdown is judged by
-export const LIFTOFF = 0;
-export const FLIGHT = 1;
-export const TOUCHDOWN = 2;
+const LIFTOFF = 0;
+const FLIGHT = 1;
+const TOUCHDOWN = 2;
 
 const massOf = ({ base, thigh, shank }) => base.mass + thigh.mass + shank.mass;
 const median = (values) => values.toSorted((a, b) => a - b)[(values.length - 1) / 2];
