@@ -21,10 +21,10 @@ CEILINGS = {
     "src/hopping_leg/sim/**/*.py": (12, 2410),
     "src/hopping_leg/viewer/**/*.py": (6, 1140),
     "src/**/*.py": (182, 28570),
-    "tests/**/*.py": (138, 15470),
+    "tests/**/*.py": (138, 15420),
     "studies/**/*.py": (79, 8120),
     "docs/**/*.md": (22, 2500),
-    "docs/live/*.js": (13, 1490),
+    "docs/live/*.js": (13, 1480),
 }
 """Files and lines at most. Who raises one says what users gain by it."""
 

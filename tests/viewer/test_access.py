@@ -11,14 +11,11 @@ pytest.importorskip("viser", reason="the extra 'view' is not installed")
 
 import viser
 import websockets
-from hypothesis import given
-from hypothesis import strategies as st
 from websockets.datastructures import Headers
 from websockets.http11 import Request
 
-from hopping_leg.errors import UsageError
 from hopping_leg.viewer.live_leg import LiveSimulation
-from hopping_leg.viewer.panels import Inputs, LivePanel, chosen
+from hopping_leg.viewer.panels import Inputs, LivePanel
 from hopping_leg.viewer.viewer import Viewer, answer
 
 OWN = ("127.0.0.1:8080", "localhost:9000", "[::1]:1", "localhost")
@@ -96,19 +93,6 @@ def test_a_page_of_another_site_can_neither_read_nor_show_nor_steer_it(foreign, 
     foreign.goto(page, wait_until="commit")  # its own page may
     assert foreign.evaluate(_KNOCK, socket) == "open"
     assert "<html" in foreign.evaluate(_READ, page)
-
-
-ANYTHING = st.none() | st.booleans() | st.floats() | st.text() | st.integers() | st.just("a.py:C")
-
-
-@given(ANYTHING)
-def test_a_value_that_was_not_offered_is_refused(value):
-    handle, offered = SimpleNamespace(value=value), ("fast", "1")
-    if value in offered:
-        assert chosen(handle, offered) == value
-    else:
-        with pytest.raises(UsageError, match="does not offer"):
-            chosen(handle, offered)
 
 
 def test_the_page_cannot_name_a_file_or_a_class(tmp_path):

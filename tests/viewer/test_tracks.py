@@ -194,12 +194,3 @@ def test_a_moment_lies_between_its_rows_and_samples_outside_of_them_are_unknown(
     np.testing.assert_array_equal(found, [np.nan, 0.3, 0.3, 0.4, np.nan])
     assert track.latest("command_m", 5.0) == 0.4
     assert np.isnan(track.latest("command_m", 0.5))
-
-
-def test_missing_angles_stay_as_they_were():
-    columns = {"time_s": np.arange(4), "knee_position_rad": np.full(4, -1.6)}
-    columns["hip_position_rad"] = [np.nan, 1.0, np.nan, 2.0]
-    track = Track("x", ROBOT)
-    for expected in ([1.0, 1.0, 1.0, 2.0], [2.0, 1.0, 1.0, 2.0]):
-        track.extend_by_trace(Trace(pl.DataFrame(columns)))
-        np.testing.assert_array_equal(track.field("hip_position_rad")[-4:], expected)
