@@ -78,7 +78,7 @@ def test_the_command_writes_pairs_and_summary_and_goes_on(tmp_path, capsys):
     draw_twin(1).save(robots / "twin-1.toml")
     draw_leg(2).save(robots / "leg-2.toml")
     words = ["zero-shot", "--controllers", "energy-shaping", "--folder", str(robots)]
-    words += ["--commands", "0.26", "0.32", "--seconds", "5", "--out", str(tmp_path / "out")]
+    words += ["--commands", "0.26", "0.32", "--seconds", "3", "--out", str(tmp_path / "out")]
     words += ["--json", str(tmp_path / "zero.json")]
     assert shared.main("sim_to_real", Options, words) == 0
     found = json.loads((tmp_path / "zero.json").read_text())

@@ -44,9 +44,9 @@ def test_phases_follow_each_other_in_order(tuned):
 
 def test_reset_forgets_everything_and_legs_do_not_depend_on_their_neighbours():
     controller = tuned_energy_shaping(ROBOT)
-    first, again = (hop(controller, QUIET, seconds=2.0).data["height_m"] for _ in range(2))
+    first, again = (hop(controller, QUIET, seconds=1.0).data["height_m"] for _ in range(2))
     np.testing.assert_array_equal(first, again)
-    alone = hop(controller, QUIET, commands=(0.35,), seconds=2.0)
+    alone = hop(controller, QUIET, commands=(0.35,), seconds=1.0)
     np.testing.assert_allclose(first[:, 2], alone.data["height_m"][:, 0])
 
 

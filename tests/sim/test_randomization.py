@@ -7,7 +7,6 @@ from operator import attrgetter, getitem
 import numpy as np
 import pytest
 
-from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.robot import Latency, load_robot
 from hopping_leg.sim.randomization import (
@@ -98,21 +97,6 @@ def test_what_controllers_believe_may_not_vary():
         drawn(2, ranges=[Range("thigh.length", "m", 0.1, 0.2, "test")])
     with pytest.raises(RobotError, match="time_constant"):
         drawn(2, ranges=[Range("contact.time_constant", "s", 1e-4, 1e-4, "test")])
-
-
-def task(seed, ranges=IDENTIFIABLE_RANGES, robot=LEG):
-    options = TaskConfig(randomised=tuple(ranges), reset_distribution="mixed", episode=0.2)
-    return HoppingTask(robot, 5, options, paper_reward(LEG), np.random.default_rng(seed), 1)
-
-
-def heights(one, ticks=80):
-    plan = np.random.default_rng(2).uniform(-1, 1, (ticks, 5, 2))
-    return np.stack([one.step(action).height for action in plan])
-
-
-def test_randomising_draws_nothing_from_the_task_itself():
-    fixed = Range("rail.friction", "N", LEG.rail.friction, LEG.rail.friction, "as it is")
-    np.testing.assert_array_equal(heights(task(0, [fixed])), heights(task(0, [])))
 
 
 @pytest.mark.parametrize("seed", [0, 1, 17])

@@ -191,10 +191,8 @@ ELASTIC = {
         *(
             pytest.param(*case, marks=pytest.mark.slow)
             for case in (
-                ("legv2", {}, False, 256, 5e-4),
                 ("legv2-paper", {}, False, 256, 5e-4),
                 ("legv2", {}, False, 256, 1.25e-4),
-                ("legv2", {}, True, 256, 5e-4),
                 ("legv2", ELASTIC, False, 256, 5e-4),
             )
         ),
