@@ -1,6 +1,5 @@
 """A chain of controllers, each of which takes over where the one before it cannot go on."""
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -44,9 +43,17 @@ class Fallback:
     def act(self, measurement: Measurement) -> Array:
         """Return joint torques, N m, (1, 2)."""
         if self._active == 0:
-            torque, reason = self._of_policy(measurement)
+            beyond = self.policy.outside(measurement)
+            self._outside = self._outside + 1 if beyond else 0
+            reason = beyond if self._outside >= _OUTSIDE_TICKS else ""
             if not reason:
-                return torque
+                try:
+                    torque = self.policy.act(measurement)
+                    if np.isfinite(torque).all():
+                        return torque
+                    reason = "it asked for a torque that is no number"
+                except Exception as error:  # the other controller goes on, whatever it was
+                    reason = str(error).rstrip(".") or type(error).__name__
             self._active = 1
             self.report(f"{self.other.name} took over from {self.policy.name}: {reason}.")
         return self.other.act(measurement)
@@ -54,20 +61,6 @@ class Fallback:
     def internals(self) -> dict[str, Array]:
         """Return which controller acts: 0 for the policy, 1 for the other."""
         return {"fallback": np.array([float(self._active)])}
-
-    def _of_policy(self, measurement: Measurement) -> tuple[Array, str]:
-        """Return the policy's torques and why they cannot be taken, or ""."""
-        unknown = np.full((1, 2), math.nan)
-        beyond = self.policy.outside(measurement)
-        self._outside = self._outside + 1 if beyond else 0
-        if self._outside >= _OUTSIDE_TICKS:
-            return unknown, beyond
-        try:
-            torque = self.policy.act(measurement)
-        except Exception as error:  # the other controller goes on, whatever it was
-            return unknown, str(error).rstrip(".") or type(error).__name__
-        wrong = "" if np.isfinite(torque).all() else "it asked for a torque that is no number"
-        return torque, wrong
 
 
 def with_fallback(controller: Controller, robot: Robot) -> Controller:

@@ -92,8 +92,7 @@ class ThreeSamples(ObservationHistory):
 
     def inputs(self) -> Inputs:
         """Return the samples as they are."""
-        names = ("q", "qd", "command")
-        return {name: getattr(self._measurement, name).astype(np.float32) for name in names}
+        return {name: getattr(self._measurement, name).astype(np.float32) for name in self.shapes}
 
 
 def _dated_shapes(

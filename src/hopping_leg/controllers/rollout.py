@@ -26,7 +26,7 @@ _START_SHARE = 0.2 / 0.29  # leg length of the standing start as a share of the 
 _IMPOSSIBLE = 1e4  # joint speed that no leg reaches, rad/s
 
 _COLUMNS = (*list(COLUMNS)[2:], "command_m", "hip_soft_limit_nm", "knee_soft_limit_nm", *LOADS)
-"""Columns of a rollout that ``_record_state`` and the loop fill by their places."""
+"""Columns of a rollout, which its loop fills by their places."""
 
 
 @dataclass(frozen=True)
@@ -160,16 +160,18 @@ def rollout(
     for tick in range(ticks):
         if perturbation is not None and isinstance(legs, LegSimulator):
             ground = perturbation.act(legs, ground, tick)
-        _record_state(data[:, tick], legs, commands[tick])
+        row = data[:, tick]
+        row[0], row[1], row[2:4], row[4:6] = legs.height, legs.height_rate, legs.q.T, legs.qd.T
+        row[10:13] = legs.foot_clearance(), legs.knee_clearance(), legs.base_clearance()
+        row[13] = commands[tick]
         torque = controller.act(plant.sense(commands[tick]))
         for name, values in controller.internals().items():
             internals.setdefault(name, np.empty((ticks, count)))[tick] = values
-        data[6:8, tick] = torque.T
+        row[6:8] = torque.T
         if perturbation is not None:
             torque = torque + perturbation.torque[tick]
-        data[8:10, tick] = plant.drive(torque).T
-        data[14:16, tick] = plant.soft_limit_torque.T
-        data[16:, tick] = legs.loads.T
+        row[8:10] = plant.drive(torque).T
+        row[14:16], row[16:] = plant.soft_limit_torque.T, legs.loads.T
         if on_tick is not None:
             on_tick(tick + 1, ticks)
     if not np.abs(data[4:6]).max() < _IMPOSSIBLE:
@@ -188,10 +190,3 @@ def rollout(
     columns = dict(zip(_COLUMNS, data, strict=True))
     # A controller's internals do not replace what is recorded of the leg.
     return Rollout(np.arange(ticks) / config.rate, columns | internals | columns, header)
-
-
-def _record_state(row: Array, legs: Simulator, command: Array) -> None:
-    row[0], row[1] = legs.height, legs.height_rate
-    row[2:4], row[4:6] = legs.q.T, legs.qd.T
-    row[10], row[11], row[12] = legs.foot_clearance(), legs.knee_clearance(), legs.base_clearance()
-    row[13] = command

@@ -183,36 +183,36 @@ def normalized(robot: Robot, variants: Sequence[Robot], ranges: Sequence[Range])
     return found
 
 
+_BACKLASH = "around [M] qdd100 +-0.1 deg at its output"
+_NOISE = "[R] standing noise, leg V2"
+
+
 def _drives() -> tuple[Range, ...]:
-    ranges: list[Range] = []
-    for name, belt, sensor in zip(JOINTS, (1.0, 2.0), STANDING_NOISE, strict=True):
-        at = f"reality.{name}"
-        noise = sensor.position_noise, sensor.velocity_noise, sensor.torque_noise
-        step = 6.4e-5 / belt
-        ranges += [
-            Range(f"{at}.torque_gain", "1", 0.9, 1.0, "[R] boom recordings 0.91"),
-            Range(f"{at}.torque_lag", "s", 5e-4, 2e-3, "[C] current loop; [R] V1 3 ms"),
-            Range(f"{at}.ripple", "N m", 0.01 * belt, 0.08 * belt, "[C] below [R] noise"),
-            Range(f"{at}.ripple_periods", "1", 252 * belt, 252 * belt, "[C] 42 a rotor turn"),
-            Range(f"{at}.efficiency", "1", 0.9, 0.98, "[C] one planetary stage"),
-            Range(f"{at}.stiction", "1", 1.0, 1.6, "[C] greased gear"),
-            Range(
-                f"{at}.backlash",
-                "rad",
-                2e-3 / belt,
-                7e-3 / belt,
-                "around [M] qdd100 +-0.1 deg at its output",
+    kinds = (("position", "rad"), ("velocity", "rad/s"), ("torque", "N m"))
+    return tuple(
+        Range(f"reality.{joint}.{name}", unit, low, high, source)
+        for joint, belt, sensor in zip(JOINTS, (1.0, 2.0), STANDING_NOISE, strict=True)
+        for name, unit, low, high, source in (
+            ("torque_gain", "1", 0.9, 1.0, "[R] boom recordings 0.91"),
+            ("torque_lag", "s", 5e-4, 2e-3, "[C] current loop; [R] V1 3 ms"),
+            ("ripple", "N m", 0.01 * belt, 0.08 * belt, "[C] below [R] noise"),
+            ("ripple_periods", "1", 252 * belt, 252 * belt, "[C] 42 a rotor turn"),
+            ("efficiency", "1", 0.9, 0.98, "[C] one planetary stage"),
+            ("stiction", "1", 1.0, 1.6, "[C] greased gear"),
+            ("backlash", "rad", 2e-3 / belt, 7e-3 / belt, _BACKLASH),
+            *(
+                (f"sensor.{kind}_noise", unit, *[getattr(sensor, f"{kind}_noise")] * 2, _NOISE)
+                for kind, unit in kinds
             ),
-        ]
-        ranges += [
-            Range(f"{at}.sensor.{kind}_noise", unit, value, value, "[R] standing noise, leg V2")
-            for kind, unit, value in zip(
-                ("position", "velocity", "torque"), ("rad", "rad/s", "N m"), noise, strict=True
-            )
-        ]
-        source = "[M] 14 bit at the rotor"
-        ranges.append(Range(f"{at}.sensor.position_step", "rad", step, step, source))
-    return tuple(ranges)
+            (
+                "sensor.position_step",
+                "rad",
+                6.4e-5 / belt,
+                6.4e-5 / belt,
+                "[M] 14 bit at the rotor",
+            ),
+        )
+    )
 
 
 MISMATCH_RANGES = (
