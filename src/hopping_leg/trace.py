@@ -60,12 +60,6 @@ class Trace:
     header: dict[str, Any] = field(default_factory=dict)
     """Robot, its digest, controller, seed, rate, versions."""
 
-    @property
-    def numbers(self) -> list[str]:
-        """Names of the columns that hold numbers or truth values, in their order."""
-        kinds = self.table.schema.items()
-        return [name for name, kind in kinds if kind.is_numeric() or kind == pl.Boolean]
-
     def column(self, name: str) -> Array:
         """Return a column as floats, (ticks,).
 

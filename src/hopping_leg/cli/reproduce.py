@@ -13,9 +13,8 @@ Examples:
   hop reproduce --seed 1 --out runs/second
 """
 
-import time
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -52,15 +51,8 @@ class Reproduce:
     recordings, robots and trainings; default: runs/reproduce or runs/quick."""
     seed: int = 0
     """Seed of the trainings; the trials' seeds follow from another number."""
-    steps: int = 1_200_000
-    """Control steps of experience of each training."""
     quick: bool = False
     """Take every step as shortly as can be, to see that it works; the numbers mean nothing."""
-
-    @property
-    def folder(self) -> Path:
-        """Where everything is kept."""
-        return self.out or Path("runs") / ("quick" if self.quick else "reproduce")
 
 
 def run(args: Reproduce) -> None:
@@ -72,19 +64,21 @@ def run(args: Reproduce) -> None:
     from hopping_leg.locks import hold_folder
     from hopping_leg.sim.randomization import draw_twin
 
-    start, folder = time.monotonic(), args.folder
+    folder = args.out or Path("runs") / ("quick" if args.quick else "reproduce")
     notes = [NOTHING_MEANT] if args.quick else []
     options.at_least(0, seed=args.seed)
-    options.at_least(1, steps=args.steps)
     drawn = draw_twin(0)
     twin, believed = drawn.robot, str(drawn.tree["extends"])
     with hold_folder(folder, UsageError):
-        _check_same(args)
+        _check_same(folder, {"seed": args.seed, "quick": args.quick})
         recordings = list(_record(twin, believed, folder))
         identified = _identify(recordings, believed, folder, quick=args.quick)
-        policy = _train(identified, args)
-        policies = {"identified": (policy, identified), "cad": (_train(believed, args), believed)}
-        transfer = _hop(twin, believed, policies, args)
+        policies = {
+            name: (_train(robot, folder / "training", args), robot)
+            for name, robot in {"identified": identified, "cad": believed}.items()
+        }
+        transfer = _hop(twin, believed, policies, quick=args.quick)
+    policy, _ = policies["identified"]
     judged = transfer.evaluation
     io.write_json(folder / "transfer.json", {**judged.to_json(), "notes": notes})
     io.write_atomically(folder / "transfer.html", write_report(transfer, None))
@@ -104,19 +98,17 @@ def run(args: Reproduce) -> None:
     tables.print_evaluation(plain_console(), judged)
     options.say(
         *notes,
-        f"Done in {(time.monotonic() - start) / 60:.1f} minutes.",
-        f"Reports: {(folder / 'transfer.html').resolve()} and {(folder / 'report.html').resolve()}",
+        f"Reports: {folder / 'transfer.html'} and {folder / 'report.html'}",
         f"Identified robot: {identified}",
         f"Policy: {policy} (its model card lies beside it)",
     )
 
 
-def _check_same(args: Reproduce) -> None:
+def _check_same(folder: Path, asked: dict[str, object]) -> None:
     """Refuse a folder that holds a run of other options."""
-    file = args.folder / "options.json"
-    asked = {k: v for k, v in asdict(args).items() if k != "out"}
+    file = folder / "options.json"
     if file.exists() and io.parse_json(file.read_bytes(), str(file)) != asked:
-        raise UsageError(f"{args.folder} holds a run with other options; give another --out.")
+        raise UsageError(f"{folder} holds a run with other options; give another --out.")
     io.write_json(file, asked)
 
 
@@ -165,13 +157,12 @@ def _identify(recordings: "list[Recording]", believed: str, folder: Path, *, qui
     return str(file)
 
 
-def _train(source: str, args: Reproduce) -> Path:
+def _train(source: str, folder: Path, args: Reproduce) -> Path:
     """Train `fast` on a robot; return the policy."""
     from hopping_leg.rl.recipes.fast import FAST
     from hopping_leg.rl.train import train
 
-    recipe = FAST.replace({"steps": 1 if args.quick else args.steps})
-    folder = args.folder / "training" / Path(source).stem
+    recipe, folder = FAST.replace({"steps": 1}) if args.quick else FAST, folder / Path(source).stem
     policy = folder / "policy.onnx"
     if not policy.exists():
         train(recipe, load_robot(source), args.seed, folder, resume=True, threads=2)
@@ -179,7 +170,7 @@ def _train(source: str, args: Reproduce) -> Path:
 
 
 def _hop(
-    twin: Robot, believed: str, policies: dict[str, tuple[Path, str]], args: Reproduce
+    twin: Robot, believed: str, policies: dict[str, tuple[Path, str]], *, quick: bool
 ) -> "EvaluationRun":
     """Let policies, told the robots of their trainings, and energy shaping hop on the twin."""
     from hopping_leg.controllers import RolloutConfig
@@ -199,7 +190,7 @@ def _hop(
             entries,
             RolloutConfig(twin, NO_NOISE),  # a twin brings its own
             commands=COMMANDS,
-            repeats=1 if args.quick else 3,
+            repeats=1 if quick else 3,
             seed=_FIRST_SEED,
             kinds=("fixed",),
             on_progress=partial(bar.show, about=f", {twin.name}"),

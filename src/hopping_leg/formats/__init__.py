@@ -93,17 +93,17 @@ def to_mcap(trace: Trace) -> bytes:
             name: writer.register_msgdef(name, definitions.generate_msgdef(name, ros_version=2)[0])
             for name in (JOINT_STATE, FLOAT)
         }
-        numbers = {name: trace.column(name) for name in trace.numbers}
-        joints = {topic: _joints(numbers, of) for topic, of in COLUMNS.items()}
-        used = {c for columns in COLUMNS.values() for triple in columns.values() for c in triple}
-        others = [name for name in numbers if name not in used and name != "time_s"]
+        kinds_of = trace.table.schema.items()
+        kept = (name for name, kind in kinds_of if kind.is_numeric() or kind == pl.Boolean)
+        numbers = {name: trace.column(name) for name in kept}
+        arrays = {topic: _arrays(numbers, joints) for topic, joints in COLUMNS.items()}
+        others = [name for name in numbers if name not in NAMES and name != "time_s"]
         for row, stamp in enumerate(map(int, stamps)):
             seconds, rest = divmod(stamp, 10**9)
             head = {"stamp": {"sec": seconds, "nanosec": rest}, "frame_id": ""}
-            for topic, arrays in joints.items():
-                if arrays["name"]:
-                    values = {q: arrays[q][row].tolist() for q in QUANTITIES}
-                    message = {"header": head, "name": arrays["name"], **values}
+            for topic, joints in COLUMNS.items():
+                if values := {name: array[row].tolist() for name, array in arrays[topic].items()}:
+                    message = {"header": head, "name": [*joints], **values}
                     writer.write_message(f"/{topic}", kinds[JOINT_STATE], message, stamp)
             for name in others:
                 message = {"data": numbers[name][row]}
@@ -111,22 +111,16 @@ def to_mcap(trace: Trace) -> bytes:
     return content.getvalue()
 
 
-def _joints(
-    numbers: dict[str, Array], columns: Mapping[str, tuple[str, str, str]]
-) -> dict[str, Any]:
-    """Return the joints that have any value, and their arrays, (rows, joints) or (rows, 0)."""
-    have = [
-        joint
-        for joint, triple in columns.items()
-        if any(c in numbers and np.isfinite(numbers[c]).any() for c in triple)
-    ]
-    rows = len(numbers["time_s"])
-    found: dict[str, Any] = {"name": have}
-    for index, quantity in enumerate(QUANTITIES):
-        wanted = [numbers.get(columns[joint][index], np.full(rows, np.nan)) for joint in have]
-        stacked = np.stack(wanted, axis=1) if have else np.empty((rows, 0))
-        found[quantity] = stacked if np.isfinite(stacked).any() else np.empty((rows, 0))
-    return found
+def _arrays(
+    numbers: dict[str, Array], joints: Mapping[str, tuple[str, str, str]]
+) -> dict[str, Array]:
+    """Return each quantity that any joint has, (rows, joints), NaN where a joint has none."""
+    unknown = np.full(len(numbers["time_s"]), np.nan)
+    return {
+        quantity: np.stack([numbers.get(column, unknown) for column in columns], axis=1)
+        for quantity, columns in zip(QUANTITIES, zip(*joints.values(), strict=True), strict=True)
+        if numbers.keys() & {*columns}
+    }
 
 
 def bag_files(path: Path) -> list[Path]:
@@ -188,7 +182,8 @@ def _messages(path: Path) -> tuple[Rows, Rows]:
             row = {_LOGGED: time, _STAMP: stamp or time}
             for quantity in QUANTITIES:
                 for joint, value in zip(message.name, getattr(message, quantity), strict=False):
-                    row[f"{name}/{joint}.{quantity}"] = float(value)
+                    if value == value:  # a joint without the quantity has NaN
+                        row[f"{name}/{joint}.{quantity}"] = float(value)
             states.setdefault(name, []).append(row)
     return states, numbers
 
