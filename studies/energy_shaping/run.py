@@ -14,7 +14,7 @@ from hopping_leg.controllers.energy_shaping import paper_energy_shaping, tuned_e
 from hopping_leg.controllers.energy_shaping.controller import EnergyShaping, LiteralEnergyShaping
 from hopping_leg.controllers.energy_shaping.virtual_leg import LegView, Phase
 from hopping_leg.evaluate.metrics import ESTIMATED_APEX, HopWindow, apex_errors, measure
-from hopping_leg.evaluate.summary import summarise
+from hopping_leg.evaluate.result import summarise
 from hopping_leg.io import plain
 from hopping_leg.robot import DEFAULT_ROBOT, TIMESTEP, Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, NoiseAndDelay, Simulator

@@ -59,7 +59,7 @@ def test_the_gallery_from_stored_traces_is_the_reports(judged, tmp_path):
     assert again[0].trace.table.equals(judged.runs[0].trace.table)
     assert not again[1].trace.table.equals(again[0].trace.table), "repeats differ in their noise"
     before, after = (draw_report_figures(judged.evaluation, runs) for runs in (judged.runs, again))
-    names = ["apexes", "distributions", "staircase", "sequence", "phase-space"]
+    names = ["staircase", "sequence", "distributions", "phase-space"]
     assert [p.name for p in before] == [p.name for p in after] == names
     labels = [a.get_xlabel() + a.get_ylabel() for p in before for a in p.figure.axes]
     assert all("/ " in label for label in labels), "axes have units"

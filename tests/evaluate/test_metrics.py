@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 
 from hopping_leg.evaluate.metrics import measure, skipped_in_run
-from hopping_leg.evaluate.summary import pool_group, summarise
+from hopping_leg.evaluate.result import pool_group, summarise
 from hopping_leg.trace import COLUMNS, Trace
 
 RATE = 200.0

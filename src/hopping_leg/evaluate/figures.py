@@ -25,23 +25,6 @@ _COLUMNS = 4  # panels of robustness beside each other
 
 
 @styled
-def draw_apexes(traces: Mapping[str, Trace]) -> Figure:
-    """Draw all controllers' apexes over time in one panel, under the command that they share."""
-    figure, ((axes,),) = panels(1, height=3.0)
-    for name, paint in controller_colours(traces).items():
-        hops, time = hop_detection.trace_hops(traces[name]), traces[name].column("time_s")
-        look: dict[str, Any] = {"markersize": 5, "linewidth": 0.5, "alpha": 0.85}
-        axes.plot(time[hops.tick], hops.apex, ".-", color=paint, label=name, **look)
-        command = traces[name].column("command_m")
-        axes.step(time, command, where="post", color=COMMAND, linewidth=1.6, zorder=1)
-    axes.plot([], [], color=COMMAND, linewidth=1.6, label="command")
-    axes.margins(x=0.01)
-    axes.set(xlabel="time / s", ylabel="apex height / m")
-    figure.legend(loc="outside upper right", ncols=min(len(traces) + 1, 4))
-    return figure
-
-
-@styled
 def draw_heights(traces: Mapping[str, Trace]) -> Figure:
     """Draw base height, command and apexes over time, a panel per controller."""
     figure, axes = panels(len(traces))

@@ -14,7 +14,7 @@ from hopping_leg.controllers import Controller, RolloutConfig
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller, shipped_policies
 from hopping_leg.errors import PolicyError, UsageError
-from hopping_leg.evaluate import motor_load, result, summary, trials
+from hopping_leg.evaluate import motor_load, result, trials
 from hopping_leg.io import versions
 from hopping_leg.robot import JOINTS, TIMESTEP, Robot, braking_times
 from hopping_leg.sim import NO_NOISE
@@ -176,7 +176,7 @@ def evaluate(
     groups = [
         row
         for group in dict.fromkeys(c.group for c in entries if c.group)
-        for row in summary.pool_group(
+        for row in result.pool_group(
             group, [r for c in entries if c.group == group for r in measured.rows(c.label)], seed
         )
     ]

@@ -21,10 +21,9 @@ Row = dict[str, Any]
 _NARROW = 7  # characters of a heading on a line of the terminal
 
 
-def millimetres(value: float | None, sign: bool = False) -> str:
+def millimetres(value: float | None) -> str:
     """Return a length in mm; a dash where there is none."""
-    there = value is not None and value == value
-    return f"{1e3 * value:{'+' if sign else ''}z.1f}" if there else "-"  # type: ignore[operator]
+    return "-" if value is None else f"{1e3 * value:z.1f}"
 
 
 _LOOKS: dict[str, tuple[str, float, str]] = {
@@ -141,45 +140,27 @@ def _staircase_table(stairs: Sequence[Row]) -> Markup:
 
 
 def verdict(evaluation: Evaluation, controller: str) -> str:
-    """Return in a sentence how near it hops to its commands, what it skips, touches and heats.
+    """Return in a sentence how near it hops to its commands, what it skips and touches.
 
     Heights between and beyond the commands count, too.
     """
-    own = evaluation.rows(controller)
-    rows = own + [row for row in evaluation.ladder if row.controller == controller]
+    rows = [r for r in evaluation.summary + evaluation.ladder if r.controller == controller]
     errors = {row: abs(row.median_error_m) for row in rows if row.hops}
     if not errors:
         return "does not hop at any height."
+    heights = {row.command_m for row in rows}
+    still = sorted(heights - {row.command_m for row in errors})
     worst = max(errors, key=errors.__getitem__)
     skipped, touched = (sum(r.skipped_hops for r in rows), sum(r.body_contacts for r in rows))
-    hops = skipped + sum(row.hops for row in rows)
     parts = [
-        f"misses its command by {_mm(median(errors.values()))} in the median of"
-        f" {len({row.command_m for row in rows})} heights and by {_mm(errors[worst])} at the worst,"
-        f" {worst.command_m:.2f} m"
+        f"misses its command by {millimetres(median(errors.values()))} mm in the median of"
+        f" {len(heights)} heights and by {millimetres(errors[worst])} mm at the worst,"
+        f" {worst.command_m:.2f} m",
+        *([f"does not hop at {', '.join(f'{height:.2f}' for height in still)} m"] if still else []),
+        f"skips {skipped} of {skipped + sum(row.hops for row in rows)} hops",
+        f"base or knee touch the ground {touched} times",
     ]
-    if still := sorted({row.command_m for row in rows} - {row.command_m for row in errors}):
-        parts.append(f"does not hop at {', '.join(f'{command:.2f}' for command in still)} m")
-    parts.append(f"skips {skipped} of {hops} hops" if skipped else "skips no hop")
-    times = "once" if touched == 1 else f"{touched} times"
-    ground = f"base or knee touch the ground {times}" if touched else ""
-    parts.append(ground or "only the foot touches the ground")
-    for stair in evaluation.staircase:
-        if stair.controller == controller:
-            rises = "rises" if stair.monotone else "does not rise"
-            parts.append(f"{rises} at every step of the staircase")
-    if (share := max(row.rated_torque_share for row in own)) > 1:
-        minutes = min(row.thermal_minutes for row in own)
-        parts.append(f"its motors give {share:.0%} of their rated torque, for {minutes:.0f} min")
-    other = evaluation.secondary
-    if other is not None and (there := [r for r in other.rows(controller) if r.hops]):
-        most = max(abs(row.median_error_m) for row in there)
-        parts.append(f"on the {other.conditions['floor']} floor misses by {_mm(most)} at the worst")
     return f"{'; '.join(parts)}."
-
-
-def _mm(metres: float) -> str:
-    return f"{1e3 * metres:.1f} mm"
 
 
 def print_evaluation(console: Console, evaluation: Evaluation) -> None:
