@@ -94,7 +94,7 @@ def test_a_bug_keeps_its_traceback(monkeypatch):
         (["evaluat"], "Did you mean 'evaluate'?"),
         (["train", "--sed", "3"], "--seed"),
         (["deploy", "fast"], "--transport"),
-        (["robots", "check", "examples/my_log.toml"], "Did you mean examples/my_leg.toml?"),
+        (["robots", "check", "examples/my_log.toml"], "Or give a .toml file"),
         (["evaluate", "leg.urdf"], "make a robot file of it: hop robots import leg.urdf."),
     ],
 )

@@ -31,4 +31,4 @@ def test_a_robot_file_is_not_replaced_and_a_description_is_no_robot(refused):
     refused(["robots", "import", LEG], "leg.toml exists and is not replaced")
     assert Path("leg.toml").read_text() == "mine"
     words = ["evaluate", "energy-shaping", "--robot", "a leg.urdf"]
-    refused(words, "make one of it: hop robots import 'a leg.urdf'.")
+    refused(words, "`hop robots import` makes one of a URDF")

@@ -87,14 +87,14 @@ OTHER_UNITS = {
 ENTRIES = [(p, e) for p, e in numbers(load_tree("legv2")) if e["unit"] in OTHER_UNITS]
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(number=st.sampled_from(ENTRIES), data=st.data())
-def test_a_value_in_another_unit_is_doubted_by_its_name(tmp_path, number, data):
+def test_a_value_in_another_unit_is_doubted_where_it_stands(tmp_path, number, data):
     path, entry = number
     factor = data.draw(st.sampled_from(OTHER_UNITS[entry["unit"]]))
     value = (entry["value"] * factor, entry["unit"])
     found = said(written(tmp_path / "leg.toml", {path: value}, "legv2"))
-    assert any(f"'{path}'" in sentence for sentence in found)
+    assert any(f"'{path.partition('.')[0]}." in sentence for sentence in found)
 
 
 @pytest.mark.parametrize(("upper", "doubted"), [(-0.1, True), (0.25, True), (0.9, False)])

@@ -150,7 +150,7 @@ def test_a_part_may_be_left_out_and_the_wiring_is_no_part_of_the_physics(tmp_pat
     [
         ("hip.lower", 3.0, "rad", "hip.upper"),
         ("knee.upper", 0.5, "rad", "knee.upper.*pendulum"),
-        ("hip.upper", 68.0, "rad", "'hip.stop_upper', the mechanical stop; is one in degrees"),
+        ("hip.upper", 68.0, "rad", "'hip.stop_upper', the mechanical stop .in degrees"),
         ("thigh.com", 0.4, "m", "thigh.length"),
         ("hip.motor.torque_limit", 40.0, "N m", "hip.motor.peak_torque"),
         ("contact.time_constant", 1e-4, "s", "contact.time_constant"),

@@ -21,28 +21,6 @@ _DRIVES: tuple[Bounds, ...] = (
     ("hardware.voltage_high", 10.0, 46.0, "moteus drives trip at 46 V (servo.max_voltage)"),
 )
 """Bounds that no robot file can move: beyond them a limit guards nothing."""
-_MOST_CURRENT = 100.0, "a moteus r4 gives 100 A at most"
-
-_PLAUSIBLE: dict[str, tuple[float, float]] = {
-    "mass": (5e-3, 20.0),
-    "length": (0.03, 1.0),
-    "com": (5e-4, 1.0),
-    "radius": (1e-3, 0.2),
-    "friction": (0.0, 20.0),
-    "rotor_inertia": (1e-7, 5e-3),
-    "armature": (1e-6, 0.5),
-    "gear_ratio": (1.0, 200.0),
-    "belt_ratio": (1.0, 10.0),
-    "peak_torque": (0.1, 300.0),
-    "torque_limit": (0.05, 300.0),
-    "rated_torque": (0.05, 300.0),
-    "no_load_speed": (2.0, 200.0),
-    "time_constant": (0.0, 0.5),
-    "damping_ratio": (0.05, 20.0),
-}
-"""Least and largest values, SI, that a leg on a rail may have, by the last part of the path."""
-_INERTIAS = (2e-3, 1.0)
-"""Inertia of a link over its mass and the square of its length."""
 _ROUNDING = 1.001
 
 _AT_OUTPUT = ("torque_limit", "peak_torque", "rated_torque", "no_load_speed")
@@ -91,19 +69,10 @@ def find_doubts(robot: Robot, origin: str, own: Tree, parent: str, inherited: Tr
         " is not stated is what rotor and gear give)."
         for cause in dict.fromkeys(unfit.values())
     ]
-    stated = (path for tree in (inherited, own) for path, _ in numbers(tree))
-    bounds = [
-        (path, *_PLAUSIBLE[path.rpartition(".")[2]])
-        for path in dict.fromkeys(stated)
-        if path.rpartition(".")[2] in _PLAUSIBLE and not path.startswith("reality.")
-    ]
-    for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
-        low, high = (share * link.mass * link.reach**2 for share in _INERTIAS)
-        bounds.append((f"{name}.inertia", low, high))
     found += [
-        f"{origin}: '{path}' is {value:.5g} but hardly beyond {low:.3g} to {high:.3g}; check its"
-        " unit and decimal point."
-        for path, low, high in bounds
+        f"{origin}: '{path}' is {value:.5g}, which hardly fits the other numbers ({low:.3g} to"
+        f" {high:.3g}); check their units and decimal points."
+        for path, low, high in _usual(robot)
         if not low <= (value := attrgetter(path)(robot)) <= high
     ]
     if robot.kind == "leg" and not _stands(robot):
@@ -112,6 +81,21 @@ def find_doubts(robot: Robot, origin: str, own: Tree, parent: str, inherited: Tr
             " joint's sign wrong, or does the knee bend forward?"
         )
     return found
+
+
+def _usual(robot: Robot) -> Iterator[tuple[str, float, float]]:
+    """Yield paths with the least and largest value that fits the leg's other numbers."""
+    size = robot.thigh.length + robot.shank.length
+    swinging = robot.thigh.mass + robot.shank.mass
+    yield "base.mass", 0, 100 * swinging
+    for ball in ("base", "knee_cap", "foot"):
+        yield f"{ball}.radius", 0, size
+    for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
+        whole = link.mass * link.reach**2
+        yield f"{name}.inertia", 0.002 * whole, whole
+    for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
+        yield f"{name}.friction", 0, joint.torque_limit
+        yield f"{name}.armature", 0, robot.mass * size**2
 
 
 def _stands(robot: Robot) -> bool:
@@ -159,9 +143,9 @@ def _bounds(robot: Robot) -> Iterator[Bounds]:
         motor, reach = joint.motor, math.inf if robot.kind == "pendulum" else 2 * math.pi
         for end in ("stop_lower", "stop_upper"):
             yield f"{name}.{end}", -reach, reach, "no leg's joint turns more than once"
-        why = f"'{name}.stop_lower', the mechanical stop, and '{name}.upper'; is one in degrees?"
+        why = f"'{name}.stop_lower', the mechanical stop, and '{name}.upper' (in degrees?)"
         yield f"{name}.lower", joint.stop_lower, joint.upper - slack, why
-        why = f"'{name}.lower' and '{name}.stop_upper', the mechanical stop; is one in degrees?"
+        why = f"'{name}.lower' and '{name}.stop_upper', the mechanical stop (in degrees?)"
         yield f"{name}.upper", joint.lower, joint.stop_upper, why
         for key in ("torque_limit", "rated_torque"):
             yield f"{at}.{key}", 0, motor.peak_torque, f"'{at}.peak_torque'"
@@ -175,7 +159,7 @@ def _bounds(robot: Robot) -> Iterator[Bounds]:
         yield f"reality.{name}.efficiency", 0, 1, "as of any gear"
         yield f"reality.{name}.stiction", 1, math.inf, "times Coulomb friction"
         yield f"hardware.{name}.id", 1, 126, "a CAN id of moteus"
-        yield f"hardware.{name}.max_current", 0, *_MOST_CURRENT
+        yield f"hardware.{name}.max_current", 0, 100.0, "a moteus r4 gives 100 A at most"
     for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
         yield f"{name}.com", 0, link.reach, f"'{name}.{'extent' if link.extent else 'length'}'"
     if robot.kind == "leg":

@@ -3,13 +3,12 @@
 import dataclasses
 import json
 import logging
-import shlex
 from importlib import resources
 from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any, get_type_hints
 
-from hopping_leg.errors import RobotError, nearest_names, unknown_name
+from hopping_leg.errors import RobotError, unknown_name
 from hopping_leg.io import Tree, is_number, one_line, parse_toml, read_dataclass
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.robot.robot_checks import check_physics, find_doubts, unfit_numbers
@@ -70,8 +69,7 @@ def parent_robot(name_or_path: str | Path) -> str | None:
         RobotError: The file is missing or not TOML.
     """
     origin = str(name_or_path)
-    parent = _read(origin).get("extends")
-    return _beside(origin, parent) if isinstance(parent, str) else None
+    return _parent(_read(origin), origin)[0] or None
 
 
 def load_tree(name_or_path: str | Path) -> Tree:
@@ -112,46 +110,26 @@ def _complete(tree: Tree, name: str, heirs: tuple[str, ...] = ()) -> Tree:
 
 def _parent(tree: Tree, name: str, heirs: tuple[str, ...] = ()) -> tuple[str, Tree]:
     """Return name and all tables of what a file extends, which ``heirs`` extend; may be none."""
-    parent = tree.get("extends", "")
-    if not isinstance(parent, str):
-        raise RobotError(
-            f"{name}: 'extends' must be a robot's name or file, not {one_line(parent)}."
-        )
     if "extends" not in tree:
         return "", {}
-    parent, heirs = _beside(name, parent), (*heirs, name)
+    parent, heirs = tree["extends"], (*heirs, name)
+    if not isinstance(parent, str):
+        said = one_line(parent)
+        raise RobotError(f"{name}: 'extends' must be a robot's name or file, not {said}.")
+    if parent.endswith(".toml") and name.endswith(".toml"):
+        parent = str(Path(name).parent / parent)
     if parent in heirs:
         circle = " -> ".join((*heirs, parent))
         raise RobotError(f"{parent}: robots extend each other in a circle ({circle}).")
     return parent, _complete(_read(parent), parent, heirs)
 
 
-def _beside(name: str, parent: str) -> str:
-    if parent.endswith(".toml") and name.endswith(".toml"):
-        return str(Path(name).parent / parent)
-    return parent
-
-
 def _read(name: str) -> Tree:
-    shipped = shipped_robots()
-    if name.endswith(".toml"):
-        path = Path(name)
-        if not path.is_file():
-            near = nearest_names(path.name, [file.name for file in path.parent.glob("*.toml")])
-            meant = f" Did you mean {path.with_name(near[0])}?" if near else ""
-            raise RobotError(
-                f"There is no robot file {path}; give a .toml file or one of:"
-                f" {', '.join(shipped)}.{meant}"
-            )
-        content = path.read_bytes()
-    elif name in shipped:
-        content = (_SHIPPED / f"{name}.toml").read_bytes()
-    else:
-        if name.endswith((".urdf", ".xml")):
-            words = shlex.join(["hop", "robots", "import", name])
-            raise RobotError(f"{name} is no robot file; make one of it: {words}.")
-        raise RobotError(unknown_name("robot", name, shipped) + " Or give a .toml file.")
-    return parse_toml(content, name, RobotError)
+    file = Path(name) if name.endswith(".toml") else _SHIPPED / f"{name}.toml"
+    if not file.is_file():
+        known = unknown_name("robot", name, shipped_robots())
+        raise RobotError(f"{known} Or give a .toml file; `hop robots import` makes one of a URDF.")
+    return parse_toml(file.read_bytes(), name, RobotError)
 
 
 def _merge(parent: Tree, child: Tree) -> Tree:
