@@ -9,7 +9,6 @@ from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.validation import validate
-from hopping_leg.robot.model import COARSE_TIMESTEP
 from studies.identification.study import Study, timed
 from studies.identification.twin import AIR, GROUND, Motion, believed, record, record_paper
 from studies.shared import Row
@@ -156,6 +155,6 @@ def unseen_errors(
     """Return the rms error of joint positions in closed loop on each recording, rad."""
     found = {}
     for name, recording in unseen.items():
-        pair = validate([recording], candidate, COARSE_TIMESTEP, threads).closed_loop_position
+        pair = validate([recording], candidate, threads).closed_loop_position_rms_rad
         found[f"{name.replace(' ', '_')}_rms_rad"] = float(np.max(pair))
     return found

@@ -1,13 +1,13 @@
 """Real recordings: each in turn is held out while the others are fitted with the default plan."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.plan import robot_of
 from hopping_leg.identify.recording import Recording, load_recording
-from hopping_leg.identify.result import validation_json
 from hopping_leg.robot import load_robot
 from studies.identification.study import Study, timed
 from studies.shared import Row
@@ -54,9 +54,7 @@ def _split(study: Study, fitted: Sequence[Recording], held: Recording) -> Row:
     identified, took = timed(
         lambda: identify(fitted, robot, validate=[held], options=options, seed=study.seed)
     )
-    after, before = (
-        _flat(validation_json(v)) for v in (identified.validation, identified.start_validation)
-    )
+    after, before = (_flat(asdict(v)) for v in (identified.validation, identified.start_validation))
     return {
         **after,
         "before": before,

@@ -108,7 +108,7 @@ def write_bad(folder):
         (["good.csv", "--parameters", "hip.frction"], "Did you mean 'hip.friction'"),
         (["good.csv", "--search", "cmaes"], "Did you mean 'cma'"),
         (["good.csv", "--bounds", "hip.friction=low,high"], "gives no bounds"),
-        (["good.csv", "--starts", "0"], "A search needs a start"),
+        (["good.csv", "--generations", "0"], "CMA-ES needs a generation"),
         (["good.csv", "--json", "good.toml"], "is an input"),
         (["good.csv", "--out", "leg.json"], "must end in .toml"),
         (["good.csv", "--out", "good.toml"], "is an input"),

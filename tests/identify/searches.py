@@ -5,7 +5,7 @@ import numpy as np
 from hopping_leg.identify.cost import Objective, Scoring
 from hopping_leg.identify.parameters import LegHypothesis, choose
 from hopping_leg.identify.simulate import cut
-from tests.identify.twin import LEG, STEP, record, swing
+from tests.identify.twin import LEG, record, swing
 
 CAD = LegHypothesis(LEG)
 TRUTH = {"hip.friction": 0.12, "hip.damping": 0.05, "knee.friction": 0.08, "knee.damping": 0.02}
@@ -17,7 +17,7 @@ BOTTOM = np.array([1.0, -0.5])
 
 def objective(parameters=TWO, scoring=SCORING, recordings=(RUN,), length=0.5):
     """Return what is searched: residuals over windows of half a second."""
-    return Objective(tuple(recordings), tuple(cut(recordings, length)), parameters, scoring, STEP)
+    return Objective(tuple(recordings), tuple(cut(recordings, length)), parameters, scoring)
 
 
 def bowl(vectors):

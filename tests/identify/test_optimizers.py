@@ -4,7 +4,6 @@ import pickle
 import numpy as np
 import pytest
 
-from hopping_leg.identify.cost import Scoring
 from hopping_leg.identify.optimizers import (
     Found,
     Pass,
@@ -13,13 +12,12 @@ from hopping_leg.identify.optimizers import (
     deal,
     jacobian,
     least_squares,
-    search,
     second_pass,
 )
 from hopping_leg.identify.parameters import choose
-from hopping_leg.identify.plan import make_plan, pass_names
+from hopping_leg.identify.plan import pass_names
 from tests.identify.searches import BOTTOM, CAD, RUN, SCORING, TRUTH, TWO, bowl, objective
-from tests.identify.twin import LEG, noisy, record, swing
+from tests.identify.twin import record, swing
 
 
 def squares(vectors):
@@ -119,16 +117,3 @@ def test_dealt_windows_are_all_there_and_every_share_is_spread_over_them():
         assert [w.start // 80 for w in share] == list(range(len(share)))
         assert len({w.start % 80 for w in share}) > 1
     assert deal(goal, 3.0, np.random.default_rng(0)) == []
-
-
-def test_shares_of_the_windows_find_more_in_the_same_time():
-    run = noisy(RUN, position_rad=1e-3)  # so that windows disagree
-    goal = objective(choose(CAD, list(TRUTH)), Scoring(), [run], 0.1)
-    plan = make_plan([run], LEG, parameters=tuple(TRUTH), search="cma")
-    ends = []
-    for generations, seconds in ((5, np.inf), (20, 0.5)):
-        options = SearchOptions(generations=generations, population=10, seconds=seconds)
-        ends.append(search(plan, goal, options)[0].found)
-    whole, shared = ends
-    assert shared.cost == goal(shared.vector[None])[0]
-    assert shared.cost < 0.5 * whole.cost

@@ -89,17 +89,17 @@ def test_a_robust_cost_counts_small_errors_alike_and_large_ones_less():
         for bound in (None, 0.5)
     )
     small, large = np.abs(plain) < 0.02, np.abs(plain) > 1.0
-    np.testing.assert_allclose(robust[small], plain[small], rtol=1e-3, atol=1e-12)
+    np.testing.assert_allclose(robust[small], plain[small], rtol=1e-3, atol=1e-8)
     assert large.any()
     assert (np.abs(robust[large]) < np.abs(plain[large])).all()
 
 
 def test_unmeasured_samples_do_not_count():
-    run, torques = changed(RUN, hip_torque_nm=None), Scoring(None, None, 1.0)
+    run, torques = changed(RUN, hip_torque_nm=None), Scoring(None, torque=1.0)
     both, one = (objective(scoring=torques, recordings=[r]).groups.size for r in (RUN, run))
     assert one == both / 2
     mute = objective(scoring=torques, recordings=[changed(run, knee_torque_nm=None)])
-    with pytest.raises(RecordingError, match="no measured sample"):
+    with pytest.raises(RecordingError, match="is no measured sample"):
         mute.residuals(HERE)
 
 
@@ -113,16 +113,3 @@ def test_the_height_of_the_base_tells_of_the_rail():
     assert at_truth < 0.01 * beside
     with pytest.raises(RecordingError, match="record height"):
         objective(friction, scoring, [air], 0.1).residuals(HERE[:, :1])
-
-
-def test_a_window_counts_in_full_below_the_level_and_the_same_far_beyond():
-    goal = objective(scoring=Scoring(0.1, unexplained=0.5))
-    plain = goal.residuals(HERE)[0]
-    squares = np.square(plain).sum()
-    assert goal.loss.cost(1e-4 * plain) == pytest.approx(1e-8 * squares, rel=1e-3)
-    assert goal.loss.cost(1e5 * plain) == pytest.approx(plain.size, rel=1e-3)
-    weighted = goal.loss.weights(plain) * plain
-    rest = goal.loss.rest(plain)
-    expected = np.square(plain.reshape(4, -1, 2)).mean(axis=1)
-    expected = (1 - 1 / np.sqrt(1 + expected / 0.5)).sum() * plain.size / 8
-    assert np.sum(weighted**2) + np.sum(rest**2) == pytest.approx(expected, rel=1e-12)

@@ -5,14 +5,11 @@ import hashlib
 import numpy as np
 import polars as pl
 import pytest
-from scipy.ndimage import uniform_filter1d
 
-from hopping_leg.errors import RecordingError, UsageError
-from hopping_leg.identify.excitation import inverse_dynamics
-from hopping_leg.identify.importers import IMPORTERS, recognise
+from hopping_leg.errors import RecordingError
+from hopping_leg.identify.importers import log_format
 from hopping_leg.identify.recording import load_recording, make_recording
-from hopping_leg.identify.recording_format import COLUMNS, PAIRS
-from hopping_leg.robot import load_robot
+from hopping_leg.identify.recording_format import PAIRS
 from tests.identify.runs import (
     METADATA,
     RECORDINGS,
@@ -79,10 +76,8 @@ def test_every_form_of_a_table_reads_the_same(tmp_path, mark, comment):
     ("content", "named"),
     [
         (b"", "no whole table"),
-        (b"# nothing\n", "no whole table"),
         (b"0,1\n1,2\n", "has no header"),
         (b"a,a\n1,2\n", "equal names"),
-        (b"a,b\n1,2,3\n", "no whole table"),
         (b"a,b\n1,2\n\n3\n", "row 1 has fewer fields than the 2 of the header"),
         (gzip.compress(b"a,b\n1,2\n", mtime=0)[:-6], "no whole table"),
         (b"time_s,hip_position_rad\ns,0\n", "column 'time_s' must hold Float64.*\"s\""),
@@ -105,15 +100,6 @@ def test_a_rigs_own_log_is_known_by_either_name_of_its_clock(tmp_path, clock):
         load_recording(other)
 
 
-def test_a_packed_file_is_read_up_to_a_size(tmp_path, monkeypatch):
-    monkeypatch.setattr("hopping_leg.identify.recording._MOST_TEXT", 1000)
-    path = write_run(tmp_path, swinging())
-    packed = tmp_path / "run.csv.gz"
-    packed.write_bytes(gzip.compress(path.read_bytes()))
-    with pytest.raises(RecordingError, match="more than 0 MiB"):
-        load_recording(packed)
-
-
 def test_a_sidecar_may_name_the_columns(tmp_path):
     own = swinging().rename({"hip_position_rad": "alpha", "time_s": "stamp"})
     sidecar = SIDECAR + '[columns]\nhip_position_rad = "alpha"\ntime_s = "stamp"\n'
@@ -130,8 +116,6 @@ def test_a_sidecar_may_name_the_columns(tmp_path):
         (SIDECAR + "columns = 3", r"\[columns\] must name"),
         (SIDECAR.replace("fixed-base", "fixed base"), "Did you mean 'fixed-base'"),
         (SIDECAR.replace("200.0", "0"), "'rate_hz' is 0.0 but must be positive"),
-        (SIDECAR + "rate = 3", "Did you mean 'rate_hz'"),
-        (SIDECAR + "stiffness = [1, -3]", "must hold zero or more"),
         (SIDECAR + "startup_rows = -1", "'startup_rows' is -1 but must be 0 or more"),
     ],
 )
@@ -157,30 +141,14 @@ def test_segments_end_where_rows_are_missing():
     assert any("stall of 20.0 ms" in warning for warning in recording.warnings)
 
 
-def test_a_log_that_keeps_every_fourth_row_has_no_stalls():
-    recording = make_recording(swinging(2400)[::4], METADATA, "made up")
-    assert recording.segments() == [slice(0, 600)]
-    assert recording.warnings == ()
-    with pytest.raises(UsageError, match="Did you mean 'position'"):
-        recording.array("positon")
-
-
 FILES = sorted(RECORDINGS.glob("*/*.csv.gz"))
-
-
-@pytest.mark.parametrize("name", IMPORTERS)
-def test_a_rig_is_recognised_by_its_own_columns_only(name):
-    importer = IMPORTERS[name]
-    assert recognise(sorted(importer.recognised_by)) is importer
-    assert recognise(sorted(importer.recognised_by)[1:]) is not importer
-    assert set(importer.columns) <= set(COLUMNS)
 
 
 @needs_recordings
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
 def test_real_recordings_are_believed(path):
     recording = load_recording(path)
-    rig = IMPORTERS[path.parent.name.replace("doublependulum_fixed_base", "doublependulum")]
+    rig = log_format(path.parent.name.replace("doublependulum_fixed_base", "doublependulum"))
     assert (recording.metadata.robot, recording.metadata.source) == (
         rig.metadata.robot,
         rig.metadata.source,
@@ -188,7 +156,7 @@ def test_real_recordings_are_believed(path):
     assert len(recording) > 700
     assert recording.has("position")
     assert recording.has("velocity")
-    known = ("stall", "start-up rows", "kept as a command of zero")
+    known = ("stall", "start-up rows")
     assert all(any(word in warning for word in known) for warning in recording.warnings)
     period = np.median(np.diff(recording.time))
     assert period * recording.metadata.rate_hz == pytest.approx(1, rel=0.02)
@@ -204,34 +172,6 @@ def test_interpolated_samples_never_count_as_measured():
     assert 0.6 < recording.exact_time.mean() < 0.9
     measured, estimate = recording.array("position"), recording.array("position_estimate")
     assert np.nanmax(np.abs(measured - estimate)) < 1e-6
-
-
-@needs_recordings
-def test_the_boom_says_what_the_base_did():
-    recording = load_recording(next((RECORDINGS / "legv2_boom").glob("one_hurdle_big*")))
-    assert recording.metadata.rig == "boom"
-    assert recording.metadata.effective_gravity == 4.5
-    assert 0.1 < np.nanmax(recording.trace.column("base_rise_m")) < 1.0
-    assert np.nanmax(np.abs(recording.array("torque_command"))) < 13
-    assert recording.trace.table["row"][0] == 3
-
-
-@needs_recordings
-@pytest.mark.parametrize("run", ["00", "04", "11"])
-def test_the_pendulum_file_explains_the_pendulums_torques(run):
-    """Signs, order of joints and the lab's numbers fit together: inverse dynamics says so."""
-    recording = load_recording(
-        next((RECORDINGS / "doublependulum_fixed_base").glob(f"*_{run}.csv.gz"))
-    )
-    position, velocity, torque = (
-        uniform_filter1d(recording.array(name), 25, axis=0)
-        for name in ("position", "velocity", "torque")
-    )
-    acceleration = np.gradient(velocity, recording.time, axis=0)
-    robot = load_robot("doublependulum")
-    predicted = inverse_dynamics(robot, "fixed-base", position, velocity, acceleration)
-    agreement = [np.corrcoef(*pair)[0, 1] for pair in zip(predicted.T, torque.T, strict=True)]
-    assert (np.array(agreement) > [0.3, 0.9]).all(), agreement
 
 
 def set_rows(table, column, rows, value):
@@ -259,55 +199,25 @@ def one_warning(recording):
 def test_uninitialised_memory_is_left_out(value):
     recording = load(set_rows(swinging(), "hip_torque_nm", [7, 30], value))
     warning = one_warning(recording)
-    assert "'hip_torque_nm', row 7" in warning
-    assert "2 such values" in warning
+    assert "'hip_torque_nm' holds uninitialised memory in 2 rows, first in row 7" in warning
     assert np.isnan(recording.array("torque")[[7, 30], 0]).all()
     assert np.isfinite(recording.array("torque")[8:30]).all()
 
 
-@pytest.mark.parametrize(
-    ("rows", "value", "sentence"),
-    [(slice(0, 500), 1e-310, "the column is left out"), (slice(None), 0.0, "is zero in all rows")],
-)
-def test_columns_of_garbage_or_zeros_are_left_out(rows, value, sentence):
-    recording = load(set_rows(swinging(), "knee_torque_nm", rows, value))
-    assert sentence in one_warning(recording)
+def test_startup_rows_are_left_out_once():
+    asleep = swinging()
+    for name in POSITIONS:
+        asleep = set_rows(asleep, name, slice(0, 4), 0.0)
+    for recording, rows in ((load(asleep), 4), (load(swinging(), startup_rows=3), 3)):
+        assert f"rows 0 to {rows - 1}" in one_warning(recording)
+        assert len(recording) == 600 - rows
+        assert recording.time[0] == pytest.approx(rows / 200)
+
+
+def test_columns_of_zeros_are_left_out():
+    recording = load(set_rows(swinging(), "knee_torque_nm", slice(None), 0.0))
+    assert "is zero in all rows" in one_warning(recording)
     assert np.isnan(recording.array("torque")[:, 1]).all()
-
-
-def test_a_command_of_zeros_is_kept():
-    recording = load(set_rows(swinging(), "hip_command_nm", slice(None), 0.0))
-    assert "'hip_command_nm' is zero in all rows" in one_warning(recording)
-    assert (recording.array("torque_command")[:, 0] == 0).all()
-    assert load(recording.trace.table, onboard="zoh").warnings == ()
-
-
-@pytest.mark.parametrize(
-    ("change", "metadata", "said", "left"),
-    [
-        ({"hip_position_rad": (slice(0, 4), 0.0)}, {}, "rows 0 to 3", 596),  # a sleeping sensor
-        ({}, {"startup_rows": 3}, "rows 0 to 2", 597),
-    ],
-)
-def test_startup_rows_are_left_out_once(change, metadata, said, left):
-    table = swinging()
-    for column, (rows, value) in change.items():
-        for name in POSITIONS if column in POSITIONS else [column]:
-            table = set_rows(table, name, rows, value)
-    recording = load(table, **metadata)
-    assert len(recording) == left
-    assert recording.time[0] == pytest.approx((600 - left) / 200)
-    assert recording.warnings == () if said is None else said in one_warning(recording)
-
-
-def test_jitter_and_sparse_values_are_normal():
-    rng = np.random.default_rng(0)
-    time = swinging()["time_s"].to_numpy() + rng.uniform(-5e-4, 5e-4, 600)
-    table = swinging().with_columns(time_s=pl.Series(time))
-    for column in table.columns[1:7]:
-        kept = pl.Series(rng.random(600) < 0.5)
-        table = table.with_columns(pl.when(kept).then(pl.col(column)).alias(column))
-    assert load(table).warnings == ()
 
 
 @pytest.mark.parametrize(
@@ -316,12 +226,10 @@ def test_jitter_and_sparse_values_are_normal():
         (swinging().drop("time_s"), "no column 'time_s'"),
         (swinging()[:0], "no rows"),
         (swinging()[:15], "too short: 15 rows.*hip_position_rad"),
-        (swinging().drop("hip_position_rad", "knee_position_rad"), "too short"),
         (set_rows(swinging(), "time_s", 50, np.nan), "'time_s' has no time in row 50"),
         (set_rows(swinging(), "time_s", 50, 0.1), "'time_s' does not increase in row 50"),
         (set_rows(swinging(), "time_s", 50, 0.245), "does not increase in row 50"),
         (scaled(swinging(), "time_s", 1e3), "'time_s' steps by 5.*one of the two is wrong"),
-        (scaled(swinging(), "time_s", 0.1), "one of the two is wrong"),
         (swinging().with_columns(height_m=250.0), r"'height_m' cannot be in m: row 0 .* mm"),
     ],
 )
@@ -357,10 +265,3 @@ def test_a_velocity_that_is_no_derivative_is_left_out(factor):
     assert "'knee_velocity_rad_s' is not the derivative" in warning
     assert np.isnan(recording.array("velocity")[:, 1]).all()
     assert np.isfinite(recording.array("velocity")[:, 0]).all()
-
-
-def test_what_was_not_recorded_or_is_in_revolutions_is_said_once():
-    missing, turned = POSITIONS[1], [*POSITIONS, *VELOCITIES, *COMMANDS]
-    alone = load(swinging().drop(missing, VELOCITIES[1]))
-    assert f"'{missing}' was not recorded" in one_warning(alone)
-    assert "not in revolutions" in one_warning(load(scaled(swinging(), turned, 0.159)))

@@ -76,7 +76,7 @@ def test_a_jump_that_stays_is_refused(jump):
 
 def test_angles_beyond_the_stops_are_refused():
     low = load_robot("legv2").knee.stop_lower
-    with pytest.raises(RecordingError, match=f"'{KNEE}' is -.*ends at {low:g}.*another robot"):
+    with pytest.raises(RecordingError, match=f"'{KNEE}' is -.*ends at {low:g}.*check sign"):
         load(swinging().with_columns(knee_position_rad=swinging()[KNEE] - 1.5))
 
 
@@ -93,7 +93,7 @@ def test_a_counter_that_wraps_goes_on(bits, unit, start, jitter):
     true = (1 + 3 // period) * period - start + np.arange(600) / 200 + jitter * rng.random(600)
     recording = clocked(true % period)
     (warning,) = recording.warnings
-    assert f"begins anew at {period:.10g} s before row" in warning
+    assert "began anew" in warning
     np.testing.assert_allclose(recording.time - recording.time[0], true - true[0], atol=1e-9)
 
 
@@ -107,10 +107,8 @@ def test_a_coarse_clock_is_refused_unless_it_counts_in_periods(tick, rate):
         clocked(np.round(time, 7), rate)
 
 
-def test_a_finer_clock_is_doubted_and_a_whole_period_or_jitter_is_not():
+def test_a_fine_clock_a_whole_period_or_jitter_is_believed():
     time = np.arange(600) / 200
-    (warning,) = clocked(np.floor(time / 9e-4) * 9e-4).warnings
-    assert "counts in 0.9 ms" in warning
     rng = np.random.default_rng(0)
     assert clocked(np.round(time, 3)).warnings == ()
     assert clocked(time + rng.uniform(-1e-3, 1e-3, 600)).warnings == ()

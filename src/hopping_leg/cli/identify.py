@@ -11,21 +11,16 @@ Examples:
   hop identify run1.csv.gz --parameters hip.friction knee.friction --bounds hip.friction=0,0.5
 """
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import tyro
 
 from hopping_leg import errors, io
 from hopping_leg.cli import COMMAND
 from hopping_leg.cli.options import JsonFile, save_json, say, say_written, show_table
-from hopping_leg.robot import JOINTS, load_robot
+from hopping_leg.robot import load_robot
 from hopping_leg.terminal import Progress
-
-if TYPE_CHECKING:
-    from hopping_leg.identify.result import Identified
 
 
 @dataclass(frozen=True)
@@ -52,8 +47,6 @@ class Identify:
     `two-pass` they are fitted besides Table I."""
     bounds: tuple[str, ...] = ()
     """Bounds in SI units, e.g. `--bounds hip.friction=0,0.5 drive.delay=0,0.01`."""
-    starts: int = 1
-    """Searches from different starts; the best one counts."""
     generations: int = 100
     """Generations of CMA-ES, in each pass."""
     population: int = 16
@@ -71,9 +64,8 @@ def run(args: Identify) -> None:
     from hopping_leg.identify import plan, recording, result
     from hopping_leg.identify.optimizers import SearchOptions
     from hopping_leg.identify.pipeline import IdentifyOptions, identify
-    from hopping_leg.identify.report import write_fit_report
 
-    effort = SearchOptions(args.starts, generations=args.generations, population=args.population)
+    effort = SearchOptions(generations=args.generations, population=args.population)
     options = IdentifyOptions(
         parameters=args.parameters,
         bounds=dict(_bounds(text) for text in args.bounds),
@@ -109,10 +101,14 @@ def run(args: Identify) -> None:
     result.save_robot(identified, args.out, origin)
     if warning := result.warning(identified):
         say(warning)
-    _show(identified)
+    show_table(result.PARAMETERS, result.shown_parameters(identified))
+    show_table(result.ERRORS, result.shown_errors(identified))
+    say(*identified.identifiability.statements)
     numbers = result.as_json(identified, args.posterior)
     save_json(args.json, {"command": COMMAND.get(), **numbers})
     if args.report:
+        from hopping_leg.identify.report import write_fit_report
+
         page = write_fit_report(identified, COMMAND.get(), args.threads)
         io.write_atomically(args.report, page)
     say_written(args.out, args.json, args.report)
@@ -133,7 +129,7 @@ def _bounds(text: str) -> tuple[str, tuple[float, float]]:
 
 def _check_outputs(args: Identify, origin: str) -> None:
     """Refuse an output that would replace an input, before any time is spent."""
-    from hopping_leg.identify.recording import sidecar_path
+    from hopping_leg.identify.recording_format import sidecar_path
 
     if args.out.suffix != ".toml":
         raise errors.UsageError(f"--out {args.out} must end in .toml, as robot files do.")
@@ -142,24 +138,3 @@ def _check_outputs(args: Identify, origin: str) -> None:
     for path in filter(None, (args.out, args.json, args.report)):
         if path.resolve() in inputs:
             raise errors.UsageError(f"{path} is an input; give another file for the result.")
-
-
-def _show(identified: "Identified") -> None:
-    from hopping_leg.identify import result
-
-    rows = []
-    for row in result.parameters_json(identified):
-        value = f"{row['value']:.4g}{' (at bound)' if row['at_bound'] else ''}"
-        interval = f"{row['interval_low']:.4g} .. {row['interval_high']:.4g}"
-        known = math.isfinite(row["interval_high"])
-        start = f"{row['start']:.4g}"
-        rows.append((row["name"], start, value, interval if known else "unknown", row["unit"]))
-    show_table(("parameter", "start", "identified", "95 % interval", "unit"), rows)
-    rows = []
-    for row in result.quality_json(identified):
-        unit, factor = ("mrad", 1e3) if row["unit"] == "rad" else (row["unit"], 1.0)
-        values = [row[f"{joint}_{when}"] for when in ("before", "after") for joint in JOINTS]
-        shown = (f"{factor * value:.3g}" if math.isfinite(value) else "-" for value in values)
-        rows.append((row["error"], *shown, unit))
-    show_table(("on held-out data, rms", "before: hip", "knee", "after: hip", "knee", "unit"), rows)
-    say(*identified.identifiability.statements)

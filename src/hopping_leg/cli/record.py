@@ -33,7 +33,6 @@ from hopping_leg.identify import paper_excitation as paper
 from hopping_leg.identify.excitation import (
     RATE,
     Excitation,
-    HardwareRange,
     Multisine,
     Template,
     demand,
@@ -60,10 +59,6 @@ class Common:
     """Targets per second, Hz."""
     track_velocity: bool = False
     """Velocity targets are the positions' derivative, as in the lab's recordings, not zero."""
-    hip_range: Pair = HardwareRange().hip
-    """Range of the real hip, rad."""
-    knee_range: Pair = HardwareRange().knee
-    """Range of the real knee, rad."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +136,7 @@ def run(
 
 def _write(args: MovingBase | MultisineCommand) -> None:
     """Write an excitation, show what it asks of the leg."""
-    robot, limits = load_robot(args.robot), HardwareRange(args.hip_range, args.knee_range)
+    robot = load_robot(args.robot)
     template: Template
     if isinstance(args, MultisineCommand):
         template = args.signal
@@ -157,9 +152,9 @@ def _write(args: MovingBase | MultisineCommand) -> None:
             bend=args.bend,
         )
         if args.adapt:
-            template = paper.adapt(template, robot, rate=args.rate, limits=limits)
+            template = paper.adapt(template, robot, rate=args.rate)
     excitation = make_excitation(
-        template, robot, rate=args.rate, limits=limits, track_velocity=args.track_velocity
+        template, robot, rate=args.rate, track_velocity=args.track_velocity
     )
     excitation.save(args.out)
     asked = demand(robot, excitation.rig, excitation.position, excitation.rate)

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
-from hopping_leg.errors import RecordingError, UsageError
+from hopping_leg.errors import RecordingError
 from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.simulate import Window, WindowSimulator
-from hopping_leg.robot.model import COARSE_TIMESTEP
 
 IN_FULL = 1e300
 """A level that no residuals reach."""
@@ -65,7 +64,7 @@ class RobustLoss:
         return np.asarray(total / np.maximum(self.sizes, 1) / self.level)
 
 
-_QUANTITIES = ("position", "velocity", "torque", "height")
+_QUANTITIES = ("position", "torque", "height")
 _FAILED = 1e3  # residual of a simulation that broke down, in units of the scales
 
 
@@ -73,14 +72,11 @@ _FAILED = 1e3  # residual of a simulation that broke down, in units of the scale
 class Scoring:
     """What counts and how much: a residual is an error divided by its quantity's scale.
 
-    The paper's J, the sum of squared joint position errors in rad2, is the default. UsageError
-    says that a scale is not positive, or nothing counts.
+    The paper's J, the sum of squared joint position errors in rad2, is the default.
     """
 
     position: float | None = 1.0
     """Scale of position errors, rad; None leaves positions out."""
-    velocity: float | None = None
-    """Scale of velocity errors, rad/s."""
     torque: float | None = None
     """Scale of torque errors, N m."""
     height: float | None = None
@@ -90,14 +86,6 @@ class Scoring:
     unexplained: float | None = None
     """Mean squared residual of a window, in one quantity of one joint, beyond which the
     window counts ever less, so that what no parameters explain hardly moves them."""
-
-    def __post_init__(self) -> None:
-        for name in (*_QUANTITIES, "robust", "unexplained"):
-            value = getattr(self, name)
-            if value is not None and not 0 < value < np.inf:
-                raise UsageError(f"The scoring's {name} is {value} but must be positive, or none.")
-        if all(getattr(self, name) is None for name in _QUANTITIES):
-            raise UsageError("The scoring counts nothing; give a scale to position or torque.")
 
 
 @dataclass(frozen=True)
@@ -112,17 +100,13 @@ class Objective:
     windows: tuple[Window, ...]
     parameters: ParameterSet
     scoring: Scoring
-    timestep: float = COARSE_TIMESTEP
-    """Physics step, s."""
     threads: int = 0
     """Worker threads, 0 for one per core."""
 
     @cached_property
     def simulator(self) -> WindowSimulator:
         """The simulations."""
-        return WindowSimulator(
-            self.recordings, self.windows, timestep=self.timestep, threads=self.threads
-        )
+        return WindowSimulator(self.recordings, self.windows, threads=self.threads)
 
     @cached_property
     def _scored(self) -> dict[str, tuple[float, Array, BoolArray]]:
@@ -133,10 +117,7 @@ class Objective:
                 values = measured(self.simulator, name)
                 scored[name] = (scale, values, ~np.isnan(values))
         if not any(mask.any() for _, _, mask in scored.values()):
-            raise RecordingError(
-                "The windows hold no measured sample of what the scoring counts; record"
-                f" {' or '.join(scored)}."
-            )
+            raise RecordingError(f"There is no measured sample; record {' or '.join(scored)}.")
         return scored
 
     @cached_property

@@ -3,7 +3,6 @@
 Before one is made it is checked whether the leg can follow: reach, joint range, speed, torque.
 """
 
-import hashlib
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,19 +22,6 @@ LEAST_CLEARANCE = 0.005  # of base and knee above the ground, m
 
 
 @dataclass(frozen=True)
-class HardwareRange:
-    """How far the joints of the real leg turn; wider than a robot file's soft limits.
-
-    The knee's default is what recordings of the leg show it can do, to either side.
-    """
-
-    hip: Pair = (-np.pi, np.pi)
-    """rad; the hip turns freely, half a turn keeps cables from winding up."""
-    knee: Pair = (-2.7, 2.7)
-    """rad"""
-
-
-@dataclass(frozen=True)
 class Demand:
     """What a trajectory asks of the joints, rad, rad/s and N m, (ticks, 2) each."""
 
@@ -45,6 +31,18 @@ class Demand:
     clearance: Array
     """Height of base and knee above the ground on which the foot stands, m; infinite where the base
     is clamped."""
+
+
+class Template(Protocol):
+    """A trajectory of the joints on a rig, its duration in s."""
+
+    @property
+    def rig(self) -> Rig: ...  # noqa: D102
+    @property
+    def duration(self) -> float: ...  # noqa: D102
+    def joints(self, robot: Robot, time: Array) -> Array:
+        """Return joint angles at times, rad, (ticks, 2); NaN where the foot is out of reach."""
+        ...
 
 
 def inverse_dynamics(robot: Robot, rig: Rig, q: Array, qd: Array, qdd: Array) -> Array:
@@ -59,7 +57,9 @@ def inverse_dynamics(robot: Robot, rig: Rig, q: Array, qd: Array, qdd: Array) ->
     if rig != "fixed-base":
         down = kinematics.jacobian(robot, q)[..., 0, :]
         inner = np.vecdot(mass[..., 0, 1:], qdd) + bias[..., 0]
-        climb = np.vecdot(down, qdd) + _centripetal(robot, q, qd)
+        angle, speed = np.cumsum(q, axis=-1), np.cumsum(qd, axis=-1)
+        lengths = np.array([robot.thigh.length, robot.shank.length])
+        climb = np.vecdot(down, qdd) - np.vecdot(np.cos(angle) * speed**2, lengths)
         force = np.maximum(mass[..., 0, 0] * climb + inner, 0.0)
         climb = (force - inner) / mass[..., 0, 0]
         torque += mass[..., 1:, 0] * climb[..., None] + down * force[..., None]
@@ -81,15 +81,24 @@ def demand(robot: Robot, rig: Rig, position: Array, rate: float) -> Demand:
     return Demand(position, velocity, torque, clearance)
 
 
-def check_demand(robot: Robot, wanted: Demand, rate: float, limits: HardwareRange) -> None:
-    """Raise UsageError for what range, ground or torque-speed lines forbid, by joint and time."""
+def possible_demand(template: Template, robot: Robot, rate: float) -> tuple[Array, Demand]:
+    """Sample a template at a rate, Hz; return times, s, and what it asks of the joints.
+
+    Raises:
+        UsageError: The leg cannot follow, for reach, stops, ground or the motors' torque-speed
+            lines; names joint and time.
+    """
+    time = np.arange(round(template.duration * rate)) / rate
+    if len(time) < 3:
+        raise UsageError(f"The excitation has only {len(time)} samples; make it longer.")
+    wanted = demand(robot, template.rig, template.joints(robot, time), rate)
     q, speed, torque, clearance = vars(wanted).values()
-    low, high = np.array([limits.hip, limits.knee]).T
+    low, high = robot.of_joints("stop_lower"), robot.of_joints("stop_upper")
     fastest, possible = robot.of_joints("no_load_speed"), MotorLimit(robot).clip(torque, speed)
     outside, low_down = (q < low) | (q > high), clearance < LEAST_CLEARANCE
     for bad, reason, *values in (
         (np.isnan(q), "the foot is out of reach"),
-        (outside, "{:.2f} rad is outside of the hardware's range {:g} to {:g} rad", q, low, high),
+        (outside, "{:.2f} rad is outside of the stops {:g} and {:g} rad", q, low, high),
         (low_down, "base or knee is {:.1f} mm above the ground, too low", 1e3 * clearance),
         (np.abs(speed) > fastest, "{:.1f} rad/s exceeds {:g} rad/s", speed, fastest),
         (
@@ -105,26 +114,7 @@ def check_demand(robot: Robot, wanted: Demand, rate: float, limits: HardwareRang
                 f"The leg cannot follow the trajectory: at {tick / rate:.3f} s, {JOINTS[joint]}:"
                 f" {reason.format(*facts)}; lower the amplitude, slow it down or adapt it."
             )
-
-
-def _centripetal(robot: Robot, q: Array, qd: Array) -> Array:
-    """Return the foot's downward acceleration at zero joint acceleration, m/s2, (...)."""
-    angle, speed = np.cumsum(q, axis=-1), np.cumsum(qd, axis=-1)
-    lengths = np.array([robot.thigh.length, robot.shank.length])
-    downward: Array = -np.vecdot(np.cos(angle) * speed**2, lengths)
-    return downward
-
-
-class Template(Protocol):
-    """A trajectory of the joints on a rig, its duration in s."""
-
-    @property
-    def rig(self) -> Rig: ...  # noqa: D102
-    @property
-    def duration(self) -> float: ...  # noqa: D102
-    def joints(self, robot: Robot, time: Array) -> Array:
-        """Return joint angles at times, rad, (ticks, 2); NaN where the foot is out of reach."""
-        ...
+    return time, wanted
 
 
 def require_positive(**numbers: float | None) -> None:
@@ -159,22 +149,20 @@ class Multisine:
     def joints(self, robot: Robot, time: Array) -> Array:
         """Return joint angles at times, rad, (ticks, 2); hip and knee take turns by harmonic."""
         del robot
-        count = math.floor(self.highest / self.lowest + 1e-9)
-        orders: Array = np.arange(1.0, count + 1)
+        orders: Array = np.arange(1.0, math.floor(self.highest / self.lowest + 1e-9) + 1)
+        fade = np.clip(np.minimum(time, self.duration - time) * self.lowest * 4, 0, 1)
+        period = np.arange(2048) / (2048 * self.lowest)
         angles = np.empty((len(time), 2))
         for joint in range(2):
             mine = orders[joint::2]
             index = np.arange(len(mine))
             phases = -np.pi * index * (index + 1) / max(1, len(mine))
-            one = np.arange(2048) / (2048 * self.lowest)
             wave, whole = (
                 np.cos(2 * np.pi * np.multiply.outer(t, mine * self.lowest) + phases).sum(axis=-1)
-                for t in (time, one)
+                for t in (time, period)
             )
             scale = self.amplitude[joint] / max(np.abs(whole).max(), 1e-12)
-            fade = np.clip(np.minimum(time, self.duration - time) * self.lowest * 4, 0, 1)
-            fade = kinematics.smooth_step(fade)
-            angles[:, joint] = self.centre[joint] + fade * scale * wave
+            angles[:, joint] = self.centre[joint] + kinematics.smooth_step(fade) * scale * wave
         return angles
 
 
@@ -204,12 +192,6 @@ class Excitation:
     def __len__(self) -> int:
         return len(self.time)
 
-    @property
-    def digest(self) -> str:
-        """SHA-256 over time, positions and velocities, hex."""
-        values = np.column_stack([self.time, self.position, self.velocity])
-        return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
-
     def save(self, path: Path) -> None:
         """Write a Parquet file, or raise TraceError if that fails."""
         names = (*PAIRS["position_command"], *PAIRS["velocity_command"])
@@ -225,38 +207,22 @@ def load_excitation(path: Path) -> Excitation:
     facts = trace.header.get(_KEY)
     if not isinstance(facts, dict) or not facts.keys() >= _FACTS.keys():
         raise TraceError(f"{path} is no excitation; write one with `hop record`.")
-    rate = facts["rate_hz"]
-    if not is_number(rate) or not rate > 0 or not all(map(str, facts.values())):
-        raise TraceError(f"{path} has a rate of {rate} Hz; write it again with `hop record`.")
+    if not is_number(facts["rate_hz"]) or not facts["rate_hz"] > 0:
+        raise TraceError(f"{path} has no rate; write it again with `hop record`.")
     pairs = (PAIRS[f"{quantity}_command"] for quantity in ("position", "velocity"))
     position, velocity = (np.column_stack([trace.column(c) for c in pair]) for pair in pairs)
     return Excitation(trace.column("time_s"), position, velocity, *(facts[n] for n in _FACTS))
 
 
 def make_excitation(
-    template: Template,
-    robot: Robot,
-    *,
-    rate: float = RATE,
-    limits: HardwareRange | None = None,
-    track_velocity: bool = False,
+    template: Template, robot: Robot, *, rate: float = RATE, track_velocity: bool = False
 ) -> Excitation:
-    """Sample a template at a rate, Hz, and check that the leg can follow it.
+    """Sample a template as ``possible_demand`` does.
 
     With ``track_velocity`` the velocity targets are the positions' derivative, as in the lab's
     recordings; otherwise they are zero, as the paper says.
-
-    Raises:
-        UsageError: The leg cannot follow; names joint, time and limit.
     """
-    time = np.arange(round(template.duration * rate)) / rate
-    if len(time) < 3:
-        raise UsageError(
-            f"An excitation of {template.duration:g} s at {rate:g} Hz has {len(time)} samples;"
-            " make it longer."
-        )
-    position = template.joints(robot, time)
-    wanted = demand(robot, template.rig, position, rate)
-    check_demand(robot, wanted, rate, limits or HardwareRange())
-    velocity = wanted.velocity if track_velocity else np.zeros_like(position)
-    return Excitation(time, position, velocity, template.rig, rate, robot.name, str(template))
+    time, wanted = possible_demand(template, robot, rate)
+    velocity = wanted.velocity if track_velocity else np.zeros_like(wanted.velocity)
+    said = (template.rig, rate, robot.name, str(template))
+    return Excitation(time, wanted.position, velocity, *said)

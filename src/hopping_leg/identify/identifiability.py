@@ -69,10 +69,10 @@ def identifiability(
     near = 1e-6 * (high - low)
     at_bound = ((vector - low <= near) | (high - vector <= near)).tolist()
     statements = _statements(parameters, values, half, correlation, at_bound)
+    covariance = total * np.outer(wide, wide)
     return Identifiability(
-        parameters.names, values, half, correlation, total * np.outer(wide, wide), at_bound,
-        statements,
-    )  # fmt: skip
+        parameters.names, values, half, correlation, covariance, at_bound, statements
+    )
 
 
 def correlation_time(residuals: Array) -> float:

@@ -1,8 +1,9 @@
 """Recordings of other loggers, recognised by their columns; a rig's format is a file in rigs/."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib import resources
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 import polars as pl
 
 from hopping_leg.errors import RecordingError
-from hopping_leg.identify.recording_format import PAIRS, RecordingMetadata
+from hopping_leg.identify.recording_format import PAIRS, RecordingMetadata, cast, sidecar_path
 from hopping_leg.io import parse_toml, read_dataclass
 
 BOOM_RADIUS = 1.146
@@ -31,42 +32,13 @@ class LogFormat:
     own_rate: bool = False
     """Whether the rate, never stated, is that of the clock to three digits, or 1 where unknown."""
 
-    def check_path(self, path: Path) -> None:
-        """Refuse the log of another design of the rig, if its path names one, e.g. designC0.
-
-        Raises:
-            RecordingError: The columns are the rig's, the leg is not.
-        """
-        named = re.search(r"design_?([A-Z])\.?(\d)", str(path))
-        design = f"design {named[1]}.{named[2]}" if named else ""
-        if design not in self.metadata.source:
-            raise RecordingError(
-                f"{path} is of {design} by its name, but '{self.metadata.robot}' is another robot"
-                f" ({self.metadata.source}); write its own robot file, and a sidecar that names it."
-            )
-
-    def read(self, table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingMetadata]:
-        """Return a recording's table and metadata from the rig's own table."""
-        present = [pl.col(own).alias(c) for c, own in self.columns.items() if own in table.columns]
-        renamed = table.select(present).with_columns(pl.int_range(pl.len()).alias("row"))
-        metadata = self.metadata
-        if self.own_rate:
-            time = table["t"].drop_nulls().to_numpy()
-            steps = np.diff(time[np.isfinite(time)])
-            step = float(np.median(steps)) if len(steps) else 0.0
-            rate = float(f"{1 / step:.3g}") if 0 < step < np.inf else 1.0
-            metadata = replace(metadata, rate_hz=rate)
-        derived = [_DERIVED[own](table) for own in self.derived if own in table.columns]
-        return renamed.with_columns(derived), metadata
-
 
 def _hip_velocity(table: pl.DataFrame) -> pl.Series:
     """Return the hip's velocity command that its drive got.
 
-    The leg swung by theta and stretched by k: q = (theta - k/2, k), with equal links. The file's
-    velocity commands are those of both, yet in all segments the hip lags behind the swing as its
-    damping would make it without the swing's velocity (60 ms), but not behind the stretching. So
-    the drive got -k/2 alone; with it a hip gain of 13 N m/rad explains all errors alike.
+    The leg swung by theta and stretched by k: q = (theta - k/2, k), with equal links. In all
+    segments the hip lags behind the swing as its damping makes it without the swing's velocity
+    (60 ms), but not behind the stretching, so the drive got -k/2 alone, not what the file says.
     """
     return (-0.5 * table["knee_vel_cmd"]).alias(PAIRS["velocity_command"][0])
 
@@ -78,17 +50,48 @@ _DERIVED: dict[str, Callable[[pl.DataFrame], pl.Series]] = {
 }
 
 
-def _load(name: str) -> LogFormat:
+RIGS = ("legv2_fixed_base", "legv1_rail", "legv2_boom", "doublependulum")
+"""Names of the known rigs."""
+
+
+@cache
+def log_format(name: str) -> LogFormat:
+    """Return the format of a rig."""
     content = (resources.files("hopping_leg.identify") / "rigs" / f"{name}.toml").read_bytes()
     return read_dataclass(LogFormat, parse_toml(content, name), name, error=RecordingError)
 
 
-IMPORTERS: Mapping[str, LogFormat] = {
-    name: _load(name) for name in ("legv2_fixed_base", "legv1_rail", "legv2_boom", "doublependulum")
-}
-"""Formats by the rig's name."""
+def read_log(table: pl.DataFrame, path: Path) -> tuple[pl.DataFrame, RecordingMetadata]:
+    """Return a recording's table and metadata from a known rig's own table.
 
-
-def recognise(columns: list[str]) -> LogFormat | None:
-    """Return the format whose columns a table has, or none."""
-    return next((f for f in IMPORTERS.values() if set(f.recognised_by).issubset(columns)), None)
+    RecordingError says that no rig has such columns, or that the path names another design of the
+    rig than the robot's, e.g. designC0.
+    """
+    if "t" not in table.columns:  # the same logs before they were converted
+        table = table.rename({"time": "t"}, strict=False)
+    known = (f for f in map(log_format, RIGS) if set(f.recognised_by).issubset(table.columns))
+    rig = next(known, None)
+    if rig is None:
+        raise RecordingError(
+            f"{path} is of no known rig ({', '.join(RIGS)}) and there is no sidecar"
+            f" {sidecar_path(path).name} beside it; its columns are:"
+            f" {', '.join(table.columns[:12])}."
+        )
+    named = re.search(r"design_?([A-Z])\.?(\d)", str(path))
+    design = f"design {named[1]}.{named[2]}" if named else ""
+    if design not in rig.metadata.source:
+        raise RecordingError(
+            f"{path} is of {design} by its name, but '{rig.metadata.robot}' is another robot;"
+            " write its own robot file, and a sidecar that names it."
+        )
+    table = cast(table, {c: pl.String if c == "phase" else pl.Float64 for c in table.columns}, path)
+    metadata = rig.metadata
+    if rig.own_rate:
+        steps = np.diff(table["t"].fill_nan(None).drop_nulls().to_numpy())
+        step = float(np.median(steps)) if len(steps) else 0.0
+        rate = float(f"{1 / step:.3g}") if 0 < step < np.inf else 1.0
+        metadata = replace(metadata, rate_hz=rate)
+    present = [pl.col(own).alias(c) for c, own in rig.columns.items() if own in table.columns]
+    derived = [_DERIVED[own](table) for own in rig.derived if own in table.columns]
+    renamed = table.select(present).with_columns(pl.int_range(pl.len()).alias("row"))
+    return renamed.with_columns(derived), metadata

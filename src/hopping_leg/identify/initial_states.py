@@ -158,8 +158,9 @@ class OffsetFinder:
         self._grid = np.arange(float(time[0]), stop, _GRID)
         command = np.nan_to_num(recording.array("torque_command"))
         pushes = np.diff(time)[:, None] * command[:-1]
-        self._time, self._first = time, command[0]
-        self._impulse = np.concatenate([np.zeros((1, 2)), np.cumsum(pushes, axis=0)])
+        # before the first row its command holds
+        self._time = np.append(time[0] - 1.0, time)
+        self._impulse = np.concatenate([-command[:1], 0 * command[:1], np.cumsum(pushes, axis=0)])
         self._q, self._qd = (
             np.stack([np.interp(self._grid, time, column) for column in values.T], axis=1)
             for values in (position, velocity)
@@ -189,9 +190,7 @@ class OffsetFinder:
         """Return what the joints felt until the next moment of the grid, N m, (n, 2)."""
         edges = np.append(self._grid, self._grid[-1] + _GRID) - hypothesis.drive.delay
         impulse = [np.interp(edges, self._time, column) for column in self._impulse.T]
-        # before the first row its command holds
-        early = np.minimum(edges - self._time[0], 0)[:, None] * self._first
-        felt = np.diff(np.stack(impulse, axis=1) + early, axis=0) / _GRID
+        felt = np.diff(np.stack(impulse, axis=1), axis=0) / _GRID
         return np.asarray(hypothesis.robot.of_joints("torque_gain") * felt)
 
     def _imbalance(

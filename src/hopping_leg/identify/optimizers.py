@@ -38,7 +38,6 @@ _SPREAD = 1.0  # first standard deviation of CMA-ES, in scales
 _CONVERGED = 1e-9  # range of a generation's costs, relative to its best, that ends CMA-ES
 _COLLAPSED = 1e-3  # standard deviation, in scales, below which a search by shares has ended
 _RECENT = 4  # generations whose best stand for election at the end of CMA-ES
-_REACH = 3.0  # scales from the first start that others are drawn within
 _FACTOR = 2.0  # the paper's second pass keeps the first one's parameters within this factor
 
 
@@ -46,9 +45,6 @@ _FACTOR = 2.0  # the paper's second pass keeps the first one's parameters within
 class SearchOptions:
     """How hard to search."""
 
-    starts: int = 1
-    """Searches, the first from the robot's own values and the others from random ones, up to three
-    scales away; the best one counts."""
     rounds: int = 4
     """Restarts of the trust region of least squares."""
     evaluations: int = 6
@@ -64,8 +60,8 @@ class SearchOptions:
     judged by another share, and the end by all."""
 
     def __post_init__(self) -> None:
-        if self.starts < 1 or self.generations < 1 or self.population < 4 or not self.seconds > 0:
-            raise UsageError("A search needs a start, a generation, 4 candidates and some seconds.")
+        if self.generations < 1 or self.population < 4:
+            raise UsageError("CMA-ES needs a generation and 4 candidates.")
 
 
 @dataclass(frozen=True)
@@ -89,8 +85,6 @@ class Pass:
     name: str
     parameters: ParameterSet
     found: Found
-    others: tuple[float, ...] = ()
-    """Costs where the other starts ended, best first."""
 
 
 def jacobian(
@@ -133,10 +127,9 @@ def least_squares(
     options: SearchOptions | None = None,
     *,
     groups: IntArray | None = None,
-    start: Array | None = None,
     report: Progress = lambda share, cost: None,
 ) -> Found:
-    """Search from one start, (k,), or the parameters' own.
+    """Search from the parameters' start.
 
     The loss weighs residuals that no parameters explain, at the levels of the moment, which makes
     the cost's own slope exact; ``groups`` are those of ``jacobian``.
@@ -144,7 +137,7 @@ def least_squares(
     options = options or SearchOptions()
     low, high = parameters.bounds
     margin = np.minimum(_MARGIN, 0.25 * (high - low))
-    vector = np.clip(np.zeros(len(low)) if start is None else start, low + margin, high - margin)
+    vector = np.clip(0.0, low + margin, high - margin)
     history: list[float] = []
     count, tried, least, last = 0, 0, np.inf, np.empty(0)
 
@@ -170,12 +163,7 @@ def least_squares(
 
     while len(history) < options.rounds:
         result = optimize.least_squares(
-            values,
-            vector,
-            jac=slopes,
-            bounds=(low, high),
-            x_scale="jac",
-            max_nfev=options.evaluations,
+            values, vector, slopes, (low, high), x_scale="jac", max_nfev=options.evaluations
         )
         vector = result.x
         history.append(2 * float(result.cost))
@@ -191,11 +179,10 @@ def cma_es(
     options: SearchOptions | None = None,
     *,
     seed: int,
-    start: Array | None = None,
     shares: Sequence[Evaluate] = (),
     report: Progress = lambda share, cost: None,
 ) -> Found:
-    """Search from one start by CMA-ES.
+    """Search from the parameters' start by CMA-ES.
 
     Costs only rank the candidates of a generation, so a share of the data is enough to judge it
     by: each generation is judged by the next of ``shares``, whose sum is ``values``. As they take
@@ -204,7 +191,7 @@ def cma_es(
     """
     options = options or SearchOptions()
     low, high = parameters.bounds
-    first = np.clip(np.zeros(len(low)) if start is None else start, low, high)
+    first = np.clip(0.0, low, high)
     bounds = [low.tolist(), high.tolist()]
     settings = {"popsize": options.population, "bounds": bounds, "seed": np.nan, "verbose": -9}
     normal = np.random.default_rng(seed).standard_normal
@@ -252,18 +239,12 @@ def search(
     if plan.search != "two-pass":
         return [run(plan.search, plan.parameters, report)]
     _, added = pass_names([r.metadata.rig for r in objective.recordings])
-    first = tuple(p for p in plan.parameters.parameters if p.name not in added)
-    found = run(
-        "two-pass, first",
-        replace(plan.parameters, parameters=first),
-        lambda stage, share, cost: report(stage, share / 2, cost),
+    kept = tuple(p for p in plan.parameters.parameters if p.name not in added)
+    first, second = (
+        lambda stage, share, cost, n=n: report(stage, (n + share) / 2, cost) for n in (0, 1)
     )
-    second = run(
-        "two-pass, second",
-        second_pass(plan.parameters, found),
-        lambda stage, share, cost: report(stage, (1 + share) / 2, cost),
-    )
-    return [found, second]
+    found = run("two-pass, first", replace(plan.parameters, parameters=kept), first)
+    return [found, run("two-pass, second", second_pass(plan.parameters, found), second)]
 
 
 def second_pass(every: ParameterSet, first: Pass) -> ParameterSet:
@@ -290,42 +271,23 @@ def _run_pass(
     parameters: ParameterSet,
     report: Report,
 ) -> Pass:
-    """Search from every start."""
+    progress = partial(report, name)
     threads = objective.threads if ray is None else 1
     objective = replace(objective, parameters=parameters, threads=threads)
-    spread = (
-        (lambda e: e)
-        if ray is None
-        else partial(partial, workers.map_rows, workers.RayWorkers(ray))
-    )
+    cluster = None if ray is None else workers.RayWorkers(ray)
+
+    def spread(evaluate: Evaluate) -> Evaluate:
+        return evaluate if cluster is None else partial(workers.map_rows, cluster, evaluate)
+
     if plan.search == "least-squares":
-        searched = partial(
-            least_squares,
-            spread(objective.residuals),
-            parameters,
-            objective.loss,
-            options,
-            groups=objective.jumping,
-        )
-    else:
-        hands = deal(objective, options.seconds, np.random.default_rng(seed))
-        shares = [spread(replace(objective, windows=hand)) for hand in hands]
-        searched = partial(cma_es, spread(objective), parameters, options, seed=seed, shares=shares)
-    low, high = parameters.bounds
-    begins = np.random.default_rng(seed).uniform(
-        np.maximum(low, -_REACH), np.minimum(high, _REACH), (options.starts, len(low))
-    )
-    begins[0] = np.clip(0.0, low, high)
-    ends = []
-    for number, begin in enumerate(begins):
-        stage = name if options.starts == 1 else f"{name}, start {number + 1} of {options.starts}"
-
-        def progress(share: float, cost: float, stage: str = stage, number: int = number) -> None:
-            report(stage, (number + share) / options.starts, cost)
-
-        ends.append(searched(start=begin, report=progress))
-    ends.sort(key=lambda end: end.cost)
-    return Pass(name, parameters, ends[0], tuple(end.cost for end in ends[1:]))
+        residuals, loss, groups = spread(objective.residuals), objective.loss, objective.jumping
+        found = least_squares(residuals, parameters, loss, options, groups=groups, report=progress)
+        return Pass(name, parameters, found)
+    hands = deal(objective, options.seconds, np.random.default_rng(seed))
+    shares = [spread(replace(objective, windows=hand)) for hand in hands]
+    values = spread(objective)
+    found = cma_es(values, parameters, options, seed=seed, shares=shares, report=progress)
+    return Pass(name, parameters, found)
 
 
 def deal(

@@ -93,7 +93,7 @@ class Strokes:
 
     @property
     def duration(self) -> float:
-        """How long it lasts, s."""
+        """In all, s."""
         return sum(part.duration for part in self.parts)
 
     def joints(self, robot: Robot, time: Array) -> Array:
@@ -123,7 +123,7 @@ def fixed_base(
     if len(amplitudes) != len(periods) or not amplitudes or not swings:
         raise UsageError(
             f"{len(amplitudes)} amplitudes and {len(periods)} periods do not pair; give as many of"
-            " one as of the other, and at least one."
+            " one as of the other."
         )
     grid = list(itertools.product(zip(amplitudes, periods, strict=True), swings))
     length = duration / len(grid)
@@ -131,9 +131,8 @@ def fixed_base(
     slowest = max(max(part.period, part.swing or 0.0) for part in parts)
     if len(grid) > 1 and length < slowest - 1e-9:
         raise UsageError(
-            f"Each of {len(grid)} strokes lasts {length:.3g} s, so that one with a period of"
-            f" {slowest:g} s would break off; make them {len(grid) * slowest:g} s or longer in all,"
-            " or give fewer or shorter periods."
+            f"Each of {len(grid)} strokes lasts {length:.3g} s, less than a period of"
+            f" {slowest:g} s; make them {len(grid) * slowest:g} s or longer in all."
         )
     return Strokes(parts)
 
@@ -142,41 +141,23 @@ moving_base = partial(fixed_base, swings=(None,), rig="rail")
 """The paper's moving-base trajectory: vertical strokes on the ground, some leave it."""
 
 
-def adapt(
-    strokes: Strokes,
-    robot: Robot,
-    *,
-    rate: float = excitation.RATE,
-    limits: excitation.HardwareRange | None = None,
-) -> Strokes:
+def adapt(strokes: Strokes, robot: Robot, *, rate: float = excitation.RATE) -> Strokes:
     """Return the strokes as large as the leg can follow: the paper's grid does not fit every leg.
 
     Amplitudes shrink in steps of 5 %, and the leg stays ``LAB_MARGIN`` from straight, where the
-    knee would have to jump. For rate, Hz, and limits see ``make_excitation``.
-
-    Raises:
-        UsageError: A stroke is beyond the leg at any amplitude.
+    knee would have to jump; the rate is in Hz. UsageError says that a stroke is beyond the leg at
+    any amplitude.
     """
-    limits = limits or excitation.HardwareRange()
     parts = []
     for stroke in strokes.parts:
         part = replace(stroke, margin=max(stroke.margin, LAB_MARGIN))
-        while not _fits(part, robot, rate, limits, last=part.amplitude * _SHRINK < _SMALLEST):
-            part = replace(part, amplitude=part.amplitude * _SHRINK)
+        while True:
+            try:
+                excitation.possible_demand(part, robot, rate)
+                break
+            except UsageError:
+                if part.amplitude * _SHRINK < _SMALLEST:
+                    raise
+                part = replace(part, amplitude=part.amplitude * _SHRINK)
         parts.append(part)
     return Strokes(tuple(parts))
-
-
-def _fits(
-    stroke: Stroke, robot: Robot, rate: float, limits: excitation.HardwareRange, *, last: bool
-) -> bool:
-    """Return whether the leg can follow; the ``last`` amplitude raises UsageError if not."""
-    time = np.arange(round(stroke.duration * rate)) / rate
-    wanted = excitation.demand(robot, stroke.rig, stroke.joints(robot, time), rate)
-    try:
-        excitation.check_demand(robot, wanted, rate, limits)
-    except UsageError:
-        if last:
-            raise
-        return False
-    return True

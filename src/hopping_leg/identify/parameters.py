@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cache, cached_property
 from operator import attrgetter
 from typing import Any, get_type_hints
@@ -11,7 +11,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.io import quantity
+from hopping_leg.io import quantity, replace_at
 from hopping_leg.robot import COARSE_TIMESTEP, Robot
 
 
@@ -22,9 +22,6 @@ class ActuatorParameters:
     stiffness: float = quantity("N m/rad", math.nan)
     damping: float = quantity("N m s/rad", math.nan)
     integral: float = quantity("N m/(rad s)", math.nan)
-    torque_limit: float = quantity("N m", math.nan)
-    torque_offset: float = quantity("N m", 0.0)
-    """Measured torque without any true torque."""
     sensor_gain: float = quantity("1", 1.0)
     """Measured torque per true torque."""
 
@@ -37,9 +34,6 @@ class Actuators:
     knee: ActuatorParameters = field(default_factory=ActuatorParameters)
     delay: float = quantity("s", 0.0)
     """From a command's time stamp to its effect."""
-    velocity_window: float = quantity("s", 0.0)
-    """Over which a drive that closes its own loop averages the velocity that it damps; its delay
-    makes stiff loops ring."""
     creep: float = quantity("rad/s", 0.0)
     """Speed that a joint has where its dry friction is only just there; 0 holds it still."""
     ramp: float = quantity("1", 0.0)
@@ -62,40 +56,23 @@ class LegHypothesis:
         """Return a parameter's value, or raise UsageError if there is no such parameter."""
         return float(attrgetter(self._path(name))(self))
 
-    def replace(self, values: dict[str, float]) -> "LegHypothesis":
+    def replace(self, values: Mapping[str, float]) -> "LegHypothesis":
         """Return the hypothesis with other values of parameters; UsageError if one is unknown."""
-        tree: dict[str, Any] = {}
+        hypothesis = self
         for name, value in values.items():
-            *path, last = self._path(name).split(".")
-            inner = tree
-            for key in path:
-                inner = inner.setdefault(key, {})
-            inner[last] = float(value)
-        hypothesis: LegHypothesis = _replaced(self, tree)
+            hypothesis = replace_at(hypothesis, self._path(name), float(value))
         return hypothesis
 
     def _path(self, name: str) -> str:
-        if name not in _names():
-            raise UsageError(unknown_name("parameter", name, _names()))
+        if name not in parameter_units():
+            raise UsageError(unknown_name("parameter", name, parameter_units()))
         return name if name.startswith("drive.") else f"robot.{name}"
 
 
-def _replaced(owner: Any, tree: dict[str, Any]) -> Any:  # noqa: ANN401
-    values = {
-        key: _replaced(getattr(owner, key), value) if isinstance(value, dict) else value
-        for key, value in tree.items()
-    }
-    return replace(owner, **values)
-
-
 @cache
-def _names() -> dict[str, str]:
-    return _units(Robot) | _units(Actuators, "drive.")
-
-
-def parameter_units() -> dict[str, str]:
+def parameter_units() -> Mapping[str, str]:
     """Return every parameter's name and unit."""
-    return dict(_names())
+    return _units(Robot) | _units(Actuators, "drive.")
 
 
 def _units(kind: type[Any], prefix: str = "") -> dict[str, str]:
@@ -119,15 +96,12 @@ _RANGES = {
     "damping": (0.0, 1.0),
     "armature": (1e-6, 0.05),
     "drive.delay": (0.0, 0.02),
-    "drive.velocity_window": (0.0, 0.02),
     "drive.creep": (0.0, 0.1),
     "drive.ramp": (0.0, 1.0),
     "drive.stiffness": (0.0, 500.0),
     "drive.damping": (0.0, 10.0),
     "drive.integral": (0.0, 100.0),
-    "drive.torque_limit": (0.5, 50.0),
     "torque_gain": (0.5, 1.5),
-    "drive.torque_offset": (-1.0, 1.0),
     "drive.sensor_gain": (0.5, 1.5),
     "load_friction": (0.0, 0.5),
 }
@@ -153,8 +127,6 @@ class Parameter:
                 f"The bounds of '{self.name}', {self.low:g} to {self.high:g} {self.unit}, exclude"
                 f" its start {self.start:g}; widen them or start inside."
             )
-        if not 0 < self.scale < math.inf:
-            raise UsageError(f"The scale of '{self.name}' is {self.scale} but must be positive.")
 
 
 @dataclass(frozen=True)
@@ -170,10 +142,8 @@ class ParameterSet:
     def __post_init__(self) -> None:
         if not self.parameters:
             raise UsageError("There is nothing to fit; name at least one parameter.")
-        for name in self.names:
-            self.base.get(name)
-            if self.names.count(name) > 1:
-                raise UsageError(f"The parameter '{name}' is named twice; name it once.")
+        if twice := [name for name in self.names if self.names.count(name) > 1]:
+            raise UsageError(f"The parameter '{twice[0]}' is named twice; name it once.")
 
     @cached_property
     def names(self) -> list[str]:

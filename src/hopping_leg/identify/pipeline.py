@@ -4,10 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import polars as pl
 
-from hopping_leg.errors import PhysicsError, RecordingError, RobotError, UsageError, unknown_name
+from hopping_leg.errors import PhysicsError, RecordingError, RobotError, UsageError
 from hopping_leg.identify import validation
-from hopping_leg.identify.cost import Objective, Scoring
+from hopping_leg.identify.cost import Objective
 from hopping_leg.identify.identifiability import Identifiability, identifiability
 from hopping_leg.identify.optimizers import Pass, Report, SearchOptions, jacobian, search
 from hopping_leg.identify.parameters import LegHypothesis
@@ -34,8 +35,6 @@ class IdentifyOptions:
     """Bounds that differ from the widest ones."""
     search: str | None = None
     """``least-squares``, ``cma`` or ``two-pass``; None lets the plan decide."""
-    scoring: Scoring | None = None
-    """What errors count; None lets the plan decide."""
     effort: SearchOptions = field(default_factory=SearchOptions)
     threads: int = 0
     """Worker threads, 0 for one per core; they change no bit of the result."""
@@ -67,64 +66,42 @@ def identify(
         raise UsageError("The seed and the number of threads must not be negative.")
     robot = replace(robot, reality=NO_MISMATCH)
     check_recordings([*recordings, *validate], robot)
-    bounds = {**_file_bounds(robot), **options.bounds}
     plan = make_plan(
         recordings,
         robot,
         parameters=options.parameters,
-        bounds=bounds,
+        bounds=options.bounds,
         search=options.search,
-        scoring=options.scoring,
     )
-    for name in options.bounds:
-        if name not in plan.parameters.names:
-            raise UsageError(
-                f"There are bounds for '{name}', which is not fitted."
-                f" {unknown_name('fitted parameter', name, plan.parameters.names)}"
-            )
     fit, held, split = _split(recordings, validate, plan, seed)
     for recording in (*recordings, *validate):
         _check_conventions(recording, plan.start)
     windows = cut(fit, plan.window, unscored=plan.unscored)
     objective = Objective(
-        tuple(fit), tuple(windows), plan.parameters, plan.scoring, plan.timestep, options.threads
+        tuple(fit), tuple(windows), plan.parameters, plan.scoring, options.threads
     )
     passes = search(plan, objective, options.effort, seed=seed, report=report, ray=options.ray)
     report("finding intervals", 1.0, passes[-1].found.cost)
     hypothesis, known = _conclude(objective, passes[-1])
     report("judging", 1.0, passes[-1].found.cost)
-    effort = (plan.timestep, options.threads)
-    before, after = (validation.validate(held, h, *effort) for h in (plan.start, hypothesis))
+    threads = options.threads
+    before, after = (validation.validate(held, h, threads) for h in (plan.start, hypothesis))
     rigs = dict.fromkeys(r.metadata.rig for r in held)
     groups = {rig: [r for r in held if r.metadata.rig == rig] for rig in rigs if len(rigs) > 1}
-    by_rig = {k: validation.validate(group, hypothesis, *effort) for k, group in groups.items()}
+    by_rig = {k: validation.validate(group, hypothesis, threads) for k, group in groups.items()}
     parts = (tuple(passes), known, tuple(fit), tuple(held), split, after, before, by_rig, seed)
     return Identified(hypothesis, plan.start, plan, *parts)
 
 
-def _file_bounds(robot: Robot) -> dict[str, tuple[float, float]]:
-    """Return bounds that robot files demand: centres of mass on links, peaks above limits."""
-    bounds = {}
-    for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
-        whole = (1 - 1e-9) * link.reach
-        if link.com < whole:
-            bounds[f"{name}.com"] = (0.25 * link.com, min(4 * link.com, whole))
-    for name, motor in (("hip", robot.hip.motor), ("knee", robot.knee.motor)):
-        least = max(motor.torque_limit, motor.rated_torque)
-        bounds[f"{name}.motor.peak_torque"] = (least, 4 * motor.peak_torque)
-    return bounds
-
-
 _RIGHT = ((1, 1), (1, 1), (0, 0))
-_QUARTERS = [(turns, 0) for turns in (-1, 1, 2)] + [(0, turns) for turns in (-1, 1, 2)]
 _MISTAKES = {
-    "the sign of hip or knee, with its angle, velocity, torque and commands, were another": [
+    "the sign of hip or knee, with its angle, velocity, torque and commands": [
         ((1, -1), (1, -1), (0, 0))
     ],
-    "the sign of the hip's torque were another": [((1, 1), (-1, 1), (0, 0))],
-    "the sign of the knee's torque were another": [((1, 1), (1, -1), (0, 0))],
-    "the zero of hip or knee were some quarter turns on": [
-        ((1, 1), (1, 1), turns) for turns in _QUARTERS
+    "the sign of the hip's torque": [((1, 1), (-1, 1), (0, 0))],
+    "the sign of the knee's torque": [((1, 1), (1, -1), (0, 0))],
+    "the zero of hip or knee, by quarter turns,": [
+        ((1, 1), (1, 1), turns) for n in (-1, 1, 2) for turns in ((n, 0), (0, n))
     ],
 }
 """Signs of angles and torques, and quarter turns of angles, hip and knee, that undo a mistake."""
@@ -144,8 +121,8 @@ def _check_conventions(recording: Recording, start: LegHypothesis) -> None:
     if left[likely] < _TOLD and given > _BETTER * left[likely]:
         raise RecordingError(
             f"{recording.name}: the motion would follow from the torques"
-            f" {given / left[likely]:.3g} times better if {likely}; a leg that hangs straight is at"
-            " zero, and a positive torque accelerates towards positive angles."
+            f" {given / left[likely]:.3g} times better if {likely} were another; a leg that hangs"
+            " straight is at zero, and a positive torque accelerates towards positive angles."
         )
 
 
@@ -157,16 +134,14 @@ def _unexplained(
     turns: tuple[int, int],
 ) -> float:
     """Return the share of the motion that its torques do not predict, infinite if unknown."""
-    changes = {}
+    changes = []
     for joint in range(2):
         for name in ("position", "velocity", "position_estimate", "velocity_estimate"):
             shift = turns[joint] * np.pi / 2 if name.startswith("position") else 0.0
-            changes[PAIRS[name][joint]] = (angles[joint], shift)
-        changes[PAIRS["torque_command"][joint]] = (torques[joint], 0.0)
+            changes.append(pl.col(PAIRS[name][joint]) * angles[joint] + shift)
+        changes.append(pl.col(PAIRS["torque_command"][joint]) * torques[joint])
     table = driven.trace.table
-    table = table.with_columns(
-        sign * table[name] + shift for name, (sign, shift) in changes.items() if name in table
-    )
+    table = table.with_columns(c for c in changes if c.meta.root_names()[0] in table.columns)
     driven = driven.with_table(table)
     errors = np.array(validation.open_loop([driven], start, _SOON))
     spread = np.nanstd(driven.array("position"), axis=0)
@@ -183,14 +158,10 @@ def _split(
     for judge in judges:
         if judge.digest and any(judge.digest == r.digest for r in recordings):
             raise UsageError(
-                f"{judge.name} is to be fitted and to judge the fit; use each for one of the two,"
-                " or leave --validate out to hold a quarter of all out."
+                f"{judge.name} is to be fitted and to judge the fit; use each for one of the two."
             )
         if judge.duration < _SHORTEST:
-            raise RecordingError(
-                f"{judge.name} is too short to judge by: {judge.duration:.3g} s; record at least"
-                f" {_SHORTEST:g} s."
-            )
+            raise RecordingError(f"{judge.name} is too short to judge by: {judge.duration:.3g} s.")
     return list(recordings), list(judges), "validation recordings"
 
 
@@ -213,8 +184,7 @@ def hold_out(
         if whole < least:
             raise RecordingError(
                 f"{recording.name} is too short: {whole:.3g} s, but {least:.3g} s are needed to"
-                " fit to one part and to judge by another; record longer, or name recordings to"
-                " judge by with --validate."
+                " fit to one part and to judge by another; or judge by others, with --validate."
             )
         count = max(_SHARE, int(whole / max(_STRETCH, 1.25 * window)))
         begin = int(rng.integers(_SHARE)) if count >= 2 * _SHARE else _SHARE - 1
@@ -248,8 +218,7 @@ def _conclude(objective: Objective, last: Pass) -> tuple[LegHypothesis, Identifi
             " narrow the bounds, fit fewer parameters, or check the recording's gains and units."
         )
     residuals = objective.residuals(vector[None])[0]
-    bounds = last.parameters.bounds
-    slopes = jacobian(objective.residuals, vector, bounds, objective.jumping)
+    slopes = jacobian(objective.residuals, vector, last.parameters.bounds, objective.jumping)
     creeping = replace(last.parameters, base=last.parameters.base.replace({"drive.creep": _CREEP}))
     change = replace(objective, parameters=creeping).residuals(vector[None])[0] - residuals
     weights = objective.loss.weights(residuals)

@@ -1,5 +1,6 @@
 """How to identify a robot from given recordings, decided from what the recordings are."""
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -9,7 +10,7 @@ from hopping_leg.errors import RecordingError, RobotError, UsageError, unknown_n
 from hopping_leg.identify import cost, initial_states, recording_format
 from hopping_leg.identify.parameters import LegHypothesis, ParameterSet, choose
 from hopping_leg.identify.recording import Recording
-from hopping_leg.robot import COARSE_TIMESTEP, JOINTS, Robot, load_robot
+from hopping_leg.robot import JOINTS, Robot, load_robot
 
 _TOLERANCE = 0.2  # share by which link lengths may differ between files of one leg
 
@@ -17,9 +18,7 @@ _TOLERANCE = 0.2  # share by which link lengths may differ between files of one 
 def robot_of(recordings: Sequence[Recording]) -> str:
     """Return the robot of recordings, or raise UsageError if there is none or there are several."""
     names = list(dict.fromkeys(r.metadata.robot for r in recordings))
-    if not names:
-        raise UsageError("No recording was given; name at least one file.")
-    if len(names) > 1:
+    if len(names) != 1:
         raise UsageError(
             f"The recordings belong to several robots ({', '.join(names)}); identify one at a time,"
             " or say with --robot where to start if these are the same leg."
@@ -33,28 +32,22 @@ def check_recordings(recordings: Sequence[Recording], robot: Robot) -> None:
         lacking = np.isnan(recording.array("position")).all(axis=0)
         if lacking.any():
             raise RecordingError(
-                f"{recording.name} has no positions of the {JOINTS[int(np.argmax(lacking))]}; a fit"
-                " needs those of both joints, as one moves the other: record both."
+                f"{recording.name} has no positions of the {JOINTS[int(np.argmax(lacking))]};"
+                " record both joints, as one moves the other."
             )
         wanted, what = "position_command", "targets of its on-board PD"
         if recording.metadata.onboard == "torque":
             wanted, what = "torque_command", "commanded torques"
         if not recording.has(wanted):
-            raise RecordingError(
-                f"{recording.name} has no {what} ({', '.join(recording_format.PAIRS[wanted])}),"
-                " so that nothing says what moved the leg; record them."
-            )
-        try:
+            names = ", ".join(recording_format.PAIRS[wanted])
+            raise RecordingError(f"{recording.name} has no {what} ({names}); record them.")
+        with contextlib.suppress(RobotError):  # filed under a robot that is not here
             own = load_robot(recording.metadata.robot)
-        except RobotError:
-            continue  # filed under a robot that is not here: nothing to compare with
-        for link in ("thigh", "shank"):
-            measured, given = (getattr(r, link).length for r in (own, robot))
-            if abs(given / measured - 1) > _TOLERANCE:
+            lengths, given = ((r.thigh.length, r.shank.length) for r in (own, robot))
+            if not np.allclose(given, lengths, rtol=_TOLERANCE):
                 raise RecordingError(
-                    f"{recording.name} is of '{recording.metadata.robot}', whose {link} is"
-                    f" {measured:g} m long, but that of '{robot.name}' is {given:g} m: another"
-                    " leg's robot file; leave --robot out or give this leg's."
+                    f"{recording.name} is of '{own.name}', whose links are {lengths} m long, but"
+                    f" those of '{robot.name}' are {given} m: another leg's robot file."
                 )
 
 
@@ -83,8 +76,6 @@ class FitPlan:
     """Duration that is simulated from one measured state, s."""
     unscored: float
     """Beginning of each window that does not count, s."""
-    timestep: float
-    """Physics step, s."""
     search: str
 
 
@@ -95,36 +86,37 @@ def make_plan(
     parameters: tuple[str, ...] | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     search: str | None = None,
-    scoring: cost.Scoring | None = None,
 ) -> FitPlan:
     """Decide how to identify a robot from recordings, on whatever rigs, as far as it is not said.
 
     Bounds are those that differ from the widest ones; ``two-pass`` is the paper's search.
 
     Raises:
-        UsageError: There is no recording, a parameter or search does not exist, or bounds
-            exclude a start.
+        UsageError: A parameter or search does not exist, or bounds exclude a start or are of a
+            parameter that is not fitted.
     """
-    if not recordings:
-        raise UsageError("There is nothing to fit to; give at least one recording.")
     search = search or "least-squares"
     if search not in SEARCHES:
         raise UsageError(unknown_name("search", search, SEARCHES))
-    start = _start(recordings, robot)
+    gains, rigs = _open_gains(recordings), [r.metadata.rig for r in recordings]
     paper = search == "two-pass"
     if paper:  # Table I, and what is asked for besides
-        first, second = pass_names([r.metadata.rig for r in recordings])
-        besides = parameters or _open_gains(recordings)
-        parameters = tuple(dict.fromkeys([*first, *second, *besides]))
-    limits = {**_speed_bounds(recordings, robot), **(bounds or {})}
-    return FitPlan(
-        start,
-        choose(start, parameters or _names(recordings), bounds=limits),
-        scoring or (cost.Scoring() if paper else _scoring(recordings)),
-        *_window(recordings),
-        COARSE_TIMESTEP,
-        search,
-    )
+        first, second = pass_names(rigs)
+        parameters = tuple(dict.fromkeys([*first, *second, *(parameters or gains)]))
+    start = LegHypothesis(robot).replace(_start(recordings, gains))
+    limits = _bounds(recordings, robot) | dict(bounds or {})
+    chosen = choose(start, parameters or _names(recordings, gains), bounds=limits)
+    for name in bounds or ():
+        if name not in chosen.names:
+            raise UsageError(unknown_name("fitted parameter", name, chosen.names))
+    scoring = cost.Scoring() if paper else _scoring(recordings, gains)
+    # On the ground a longer window is rugged: the moment of touchdown decides all that follows.
+    window, unscored = (2.0, 0.5) if gains else (4.0, 1.0)
+    if any(r.metadata.onboard == "torque" for r in recordings):
+        window, unscored = 0.4, 0.0
+    if set(rigs) != {"fixed-base"}:
+        window, unscored = 0.25, 0.0
+    return FitPlan(start, chosen, scoring, window, unscored, search)
 
 
 def pass_names(rigs: Sequence[recording_format.Rig]) -> tuple[list[str], list[str]]:
@@ -132,36 +124,26 @@ def pass_names(rigs: Sequence[recording_format.Rig]) -> tuple[list[str], list[st
 
     Without a moving base among the rigs nothing is known of rail and contact.
     """
-    moving = any(rig != "fixed-base" for rig in rigs)
-    if moving:
-        return _JOINT_PARAMETERS + _RAIL_PARAMETERS, _INERTIAS + _SOLVER_PARAMETERS
-    return _JOINT_PARAMETERS, _INERTIAS
+    if set(rigs) == {"fixed-base"}:
+        return _JOINT_PARAMETERS, _INERTIAS
+    return _JOINT_PARAMETERS + _RAIL_PARAMETERS, _INERTIAS + _SOLVER_PARAMETERS
 
 
-def _names(recordings: Sequence[Recording]) -> list[str]:
+def _names(recordings: Sequence[Recording], gains: list[str]) -> list[str]:
     """Return what these recordings can tell, and drives' gains nobody knows."""
     first, second = pass_names([r.metadata.rig for r in recordings])
     names = [n for n in first + second if n not in (*_INERTIAS, "hip.armature")]
     names += ["thigh.com", "shank.com", *_INERTIAS, "drive.delay"]
-    if _tell_load(recordings):
-        names += [f"{joint}.load_friction" for joint in JOINTS]
-    if all(map(_tells_gain, recordings)):
-        names += [f"{joint}.torque_gain" for joint in JOINTS]
-    return [*names, *_limits(recordings), *_open_gains(recordings)]
-
-
-def _tell_load(recordings: Sequence[Recording]) -> bool:
-    """Return whether recordings tell friction that grows with torque from one that does not."""
-    # In the air a loop asks for torque where it meets damping; on the ground weight asks for it.
+    # What motors gave is known where it was commanded, or measured beside what was asked for.
     commanded = [r.metadata.onboard == "torque" for r in recordings]
+    measured = [r.metadata.onboard == "zoh" and r.has("torque") for r in recordings]
+    # In the air a loop asks for torque where it meets damping; on the ground weight asks for it.
     grounded = any(r.metadata.rig != "fixed-base" for r in recordings)
-    known = (c or _tells_gain(r) for c, r in zip(commanded, recordings, strict=True))
-    return all(commanded) or (grounded and all(known))
-
-
-def _tells_gain(recording: Recording) -> bool:
-    """Return whether a recording shows what motors gave beside what they were asked for."""
-    return recording.metadata.onboard == "zoh" and recording.has("torque")
+    if all(commanded) or (grounded and np.logical_or(commanded, measured).all()):
+        names += [f"{joint}.load_friction" for joint in JOINTS]
+    if all(measured):
+        names += [f"{joint}.torque_gain" for joint in JOINTS]
+    return [*names, *_limits(recordings), *gains]
 
 
 def _open_gains(recordings: Sequence[Recording]) -> list[str]:
@@ -197,48 +179,47 @@ def _limits(recordings: Sequence[Recording]) -> list[str]:
     return [f"{j}.motor.{n}" for j, far in zip(JOINTS, beyond, strict=True) if far for n in lines]
 
 
-def _speed_bounds(recordings: Sequence[Recording], robot: Robot) -> dict[str, tuple[float, float]]:
-    """Return bounds of the motors' no-load speeds: what a joint was seen to reach, it can."""
-    speeds = np.abs(np.concatenate([r.array("velocity") for r in recordings]))
+def _bounds(recordings: Sequence[Recording], robot: Robot) -> dict[str, tuple[float, float]]:
+    """Return bounds that robot files demand, and of what a joint was seen to do.
+
+    Centres of mass lie on links, peak torques above limits, and no-load speeds above what joints
+    reached.
+    """
     found = {}
+    for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
+        whole = (1 - 1e-9) * link.reach
+        if link.com < whole:
+            found[f"{name}.com"] = (0.25 * link.com, min(4 * link.com, whole))
+    speeds = np.abs(np.concatenate([r.array("velocity") for r in recordings]))
     for name, joint, speed in zip(JOINTS, (robot.hip, robot.knee), speeds.T, strict=True):
-        seen = speed[np.isfinite(speed)]
+        motor, seen = joint.motor, speed[np.isfinite(speed)]
+        peak = max(motor.torque_limit, motor.rated_torque)
+        found[f"{name}.motor.peak_torque"] = (peak, 4 * motor.peak_torque)
         least = _REACHED * joint.belt_ratio * float(np.quantile(seen, _FASTEST)) if len(seen) else 0
-        known = joint.motor.no_load_speed
+        known = motor.no_load_speed
         found[f"{name}.motor.no_load_speed"] = (max(0.25 * known, min(least, known)), 4 * known)
     return found
 
 
-def _start(recordings: Sequence[Recording], robot: Robot) -> LegHypothesis:
+def _start(recordings: Sequence[Recording], gains: list[str]) -> dict[str, float]:
+    """Return where the drives' open numbers begin: as stated, or as usual."""
     values = {}
-    for name in _open_gains(recordings):
+    for name in gains:
         _, joint, gain = name.split(".")
-        pairs = [getattr(r.metadata, gain) for r in recordings]
-        known = next((p for p in pairs if p is not None), None)
-        values[name] = _GAINS[gain] if known is None else known[joint == "knee"]
+        stated = (getattr(r.metadata, gain) for r in recordings)
+        pair = next((p for p in stated if p is not None), (_GAINS[gain],) * 2)
+        values[name] = pair[joint == "knee"]
     if any(r.metadata.onboard == "continuous" and r.has("velocity_command") for r in recordings):
         values["drive.ramp"] = 1.0
-    return LegHypothesis(robot).replace(values)
+    return values
 
 
-def _scoring(recordings: Sequence[Recording]) -> cost.Scoring:
+def _scoring(recordings: Sequence[Recording], gains: list[str]) -> cost.Scoring:
     if all(r.metadata.onboard == "torque" for r in recordings):
         return cost.Scoring(position=0.02, robust=2.0, unexplained=0.4)
     torque = 0.2 if any(r.has("torque") for r in recordings) else None
-    if torque is not None and _open_gains(recordings):
+    if torque is not None and gains:
         return cost.Scoring(position=0.003, torque=0.5, robust=1.0, unexplained=0.4)
     rails = [r for r in recordings if r.metadata.rig == "rail"]
     height = 0.002 if any(r.has_column("height_m") for r in rails) else None
     return cost.Scoring(position=0.005, torque=torque, height=height, robust=3.0, unexplained=0.4)
-
-
-def _window(recordings: Sequence[Recording]) -> tuple[float, float]:
-    """Return window and unscored beginning, s."""
-    # On the ground a longer one is rugged: the moment of touchdown decides all that follows.
-    if any(r.metadata.rig != "fixed-base" for r in recordings):
-        return 0.25, 0.0
-    if any(r.metadata.onboard == "torque" for r in recordings):
-        return 0.4, 0.0
-    if _open_gains(recordings):
-        return 2.0, 0.5
-    return 4.0, 1.0

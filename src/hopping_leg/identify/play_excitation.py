@@ -1,6 +1,7 @@
 """Recordings of an excitation: played on a simulated leg, or cut from a trace of motors."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -9,7 +10,7 @@ from hopping_leg.controllers.joint_pd import JointGains, JointPD
 from hopping_leg.errors import PhysicsError, RecordingError
 from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.recording import Recording, make_recording
-from hopping_leg.identify.recording_format import MEASURED, PAIRS, Quantisation, RecordingMetadata
+from hopping_leg.identify.recording_format import MEASURED, PAIRS, RecordingMetadata
 from hopping_leg.robot import TIMESTEP, Robot
 from hopping_leg.sim import NO_NOISE, LegSimulator, Plant
 from hopping_leg.trace import Trace
@@ -64,40 +65,39 @@ def play(
     if not np.abs(rows[:, 2:4]).max() < _IMPOSSIBLE:
         raise PhysicsError(
             f"The simulation of {robot.name} became unstable at a physics step of {timestep:g} s;"
-            " take a smaller one, weaker gains or a gentler excitation."
+            " take a smaller one or weaker gains."
         )
-    kinds = ("position", "velocity", "torque")
-    steps = (float(robot.reality.of_sensors(f"{kind}_step").max()) for kind in kinds)
     source = f"simulated: {robot.name} ({robot.digest}), seed {seed}"
-    metadata = _metadata(excitation, believed, gains, source, Quantisation(*steps))
-    header = {
-        "robot": robot.name,
-        "robot_digest": robot.digest,
-        "seed": seed,
-        "timestep_s": timestep,
-        "excitation": excitation.description,
-        "excitation_digest": excitation.digest,
-    }
     values = (*rows[:, :6].T, *excitation.position.T, *excitation.velocity.T)
     columns = {"time_s": excitation.time} | dict(zip(MEASURED + _TARGETS, values, strict=True))
     if not fixed:
         columns |= {"height_m": rows[:, 6], "contact": rows[:, 7] <= 0}
-    return make_recording(pl.DataFrame(columns), metadata, robot.name, header=header)
+    header = {"robot": robot.name, "robot_digest": robot.digest, "seed": seed}
+    header["timestep_s"] = timestep
+    table = pl.DataFrame(columns)
+    return _filed(table, excitation, believed, gains, source, robot.name, header)
 
 
-def _metadata(
-    excitation: Excitation, robot: str, gains: JointGains, source: str, steps: Quantisation
-) -> RecordingMetadata:
-    return RecordingMetadata(
+def _filed(
+    table: pl.DataFrame,
+    excitation: Excitation,
+    believed: str,
+    gains: JointGains,
+    source: str,
+    name: str,
+    header: dict[str, Any],
+) -> Recording:
+    metadata = RecordingMetadata(
         excitation.rig,
         excitation.rate,
-        robot,
+        believed,
         source,
         onboard="zoh",
         stiffness=gains.stiffness,
         damping=gains.damping,
-        quantisation=steps,
     )
+    header["excitation"] = excitation.description
+    return make_recording(table, metadata, name, header=header)
 
 
 def recording_of(
@@ -118,11 +118,6 @@ def recording_of(
     first = float(table["time_s"][0])
     time = np.round(table["time_s"].to_numpy() - first, 9)
     source = f"motors on {trace.header.get('transport')}, {trace.header.get('started')}"
-    metadata = _metadata(excitation, believed, gains, source, Quantisation())
-    facts = {
-        "excitation": excitation.description,
-        "excitation_digest": excitation.digest,
-        "run": {k: v for k, v in trace.header.items() if k != "events"},
-    }
+    header = {"run": {k: v for k, v in trace.header.items() if k != "events"}}
     table = table.select(pl.Series("time_s", time), *MEASURED, *_TARGETS)
-    return make_recording(table, metadata, name, header=facts)
+    return _filed(table, excitation, believed, gains, source, name, header)

@@ -6,9 +6,7 @@ need a sidecar, or come from one of the known rigs.
 
 import gzip
 import hashlib
-import io
 import zlib
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -21,12 +19,18 @@ from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import RecordingError, UsageError, unknown_name
 from hopping_leg.formats import bag_files, read_bag
 from hopping_leg.identify import importers, recording_checks
-from hopping_leg.identify.recording_format import COLUMNS, PAIRS, RecordingMetadata, float_column
+from hopping_leg.identify.recording_format import (
+    COLUMNS,
+    PAIRS,
+    RecordingMetadata,
+    cast,
+    float_column,
+    sidecar_path,
+)
 from hopping_leg.io import parse_toml, read_dataclass
 from hopping_leg.trace import Trace, read_parquet
 
 _KEY, _PARQUET, _GZIP = "recording", b"PAR1", b"\x1f\x8b"
-_MOST_TEXT = 1 << 28  # of a packed file, bytes
 _BAGS = (".mcap", ".db3")
 _UNREADABLE = (pl.exceptions.PolarsError, pl.exceptions.PanicException)
 
@@ -75,12 +79,8 @@ class Recording:
 
     def segments(self) -> list[slice]:
         """Return the stretches of rows without a stall, in order."""
-        longest = recording_checks.STALL * recording_checks.row_period(
-            self.time, self.metadata.period
-        )
-        stalls = np.flatnonzero(np.diff(self.time) > longest) + 1
-        edges = [0, *stalls.tolist(), len(self)]
-        return [slice(a, b) for a, b in pairwise(edges)]
+        stalls = recording_checks.stalls(self.time, self.metadata.period) + 1
+        return [slice(a, b) for a, b in pairwise([0, *stalls.tolist(), len(self)])]
 
     @property
     def duration(self) -> float:
@@ -113,17 +113,12 @@ def make_recording(
     metadata: RecordingMetadata,
     name: str,
     *,
-    names: Mapping[str, str] | None = None,
     header: dict[str, Any] | None = None,
     digest: str = "",
 ) -> Recording:
-    """Check a table in the columns of ``COLUMNS`` and return it as a recording.
-
-    Messages name the file, and its own columns by ``names`` where they differ from a recording's;
-    RecordingError says that the table cannot be believed.
-    """
-    table = _cast(table, COLUMNS, name).with_columns(pl.selectors.float().fill_nan(None))
-    inspection = recording_checks.Inspection(table, metadata, name, names or {})
+    """Return a table in the columns of ``COLUMNS`` as a recording, or raise RecordingError."""
+    table = cast(table, COLUMNS, name).with_columns(pl.selectors.float().fill_nan(None))
+    inspection = recording_checks.Inspection(table, metadata, name)
     recording_checks.check_table(inspection)
     trace, warnings = Trace(inspection.table, header or {}), tuple(inspection.warnings)
     return Recording(trace, inspection.metadata, Path(name).name, digest, warnings)
@@ -136,49 +131,34 @@ def load_recording(path: str | Path) -> Recording:
         RecordingError: It cannot be read or believed; names file, column and row.
     """
     path = Path(path)
-    origin = str(path)
+    origin, sidecar = str(path), sidecar_path(path)
     table, header, digest = _read(path, origin)
-    sidecar = _sidecar(path)
-    names: dict[str, str] = {}
-    if sidecar is not None:
-        table, metadata, names = _apply(sidecar, table, origin)
+    if sidecar != path and sidecar.is_file():
+        table, metadata = _described(sidecar, table, origin)
     elif _KEY in header:
-        tree = header.pop(_KEY)
-        metadata = read_dataclass(RecordingMetadata, tree, origin, error=RecordingError)
+        metadata = _metadata(header.pop(_KEY), origin)
     else:
-        if "t" not in table.columns:  # the same logs before they were converted
-            table = table.rename({"time": "t"}, strict=False)
-        importer = importers.recognise(table.columns)
-        if importer is None:
-            raise RecordingError(
-                f"{origin} is of no known rig ({', '.join(importers.IMPORTERS)}) and there is no"
-                f" sidecar {sidecar_path(path).name} beside it; its columns are:"
-                f" {', '.join(table.columns[:12])}."
-            )
-        importer.check_path(path)
-        kinds = {c: pl.String if COLUMNS.get(c) is pl.String else pl.Float64 for c in table.columns}
-        table, metadata = importer.read(_cast(table, kinds, origin))
-        names = importer.columns
-    return make_recording(table, metadata, origin, names=names, header=header, digest=digest)
+        table, metadata = importers.read_log(table, path)
+    return make_recording(table, metadata, origin, header=header, digest=digest)
 
 
 def _read(path: Path, origin: str) -> tuple[pl.DataFrame, dict[str, Any], str]:
     """Return a file's or bag's own table, its header, and the SHA-256 of its bytes."""
+    bag = path.is_dir() or path.suffix in _BAGS
     try:
-        bag = path.is_dir() or path.suffix in _BAGS
-        files = bag_files(path) if bag else []
-        content = b"".join(file.read_bytes() for file in files or [path])
-    except FileNotFoundError as error:
-        raise RecordingError(f"There is no recording {path}.") from error
-    except IsADirectoryError as error:
-        raise RecordingError(f"{path} is a folder without .mcap or .db3 files, no bag.") from error
+        files = bag_files(path) if bag else [path]
+        content = b"".join(file.read_bytes() for file in files)
     except OSError as error:
         raise RecordingError(f"Cannot read the recording {path}: {error.strerror}.") from error
+    if not files:
+        raise RecordingError(f"{path} is a folder without .mcap or .db3 files, no bag.")
     digest = hashlib.sha256(content).hexdigest()
-    if files:
+    if bag:
         return *read_bag(path, origin), digest
     if content.startswith(_PARQUET):
-        return *_native(path, content), digest
+        table, metadata = read_parquet(content, origin, RecordingError)
+        native = "hopping_leg" in metadata
+        return table, dict(Trace.of(table, metadata, path).header) if native else {}, digest
     return _read_csv(content, origin), {}, digest
 
 
@@ -189,13 +169,7 @@ def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
     """
     try:
         if content.startswith(_GZIP):
-            with gzip.open(io.BytesIO(content)) as file:
-                content = file.read(_MOST_TEXT + 1)
-            if len(content) > _MOST_TEXT:
-                raise RecordingError(
-                    f"{origin} holds more than {_MOST_TEXT >> 20} MiB of text; split it, or write"
-                    " Parquet."
-                )
+            content = gzip.decompress(content)
         lines = (n for n in content.splitlines() if n.strip() and n[:1] != b"#")
         header = next(lines, b"")
         mark = next((m for m in "\t;" if m.encode() in header), ",")
@@ -203,8 +177,8 @@ def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
         short = next((k for k, n in enumerate(lines) if n.count(mark.encode()) < fields), None)
         if short is not None:
             raise RecordingError(
-                f"{origin}: row {short} has fewer fields than the {fields + 1} of the header; a"
-                " logger that was killed leaves such a row: delete it."
+                f"{origin}: row {short} has fewer fields than the {fields + 1} of the header, as a"
+                " killed logger leaves it; delete the row."
             )
         texts = pl.read_csv(content, separator=mark, comment_prefix="#", infer_schema=False)
     except (OSError, EOFError, zlib.error, *_UNREADABLE) as error:
@@ -223,34 +197,14 @@ def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
     return pl.DataFrame(columns)
 
 
-def sidecar_path(path: Path) -> Path:
-    """Return where a table's sidecar would be."""
-    name = path.name.removesuffix(".gz")
-    return path.with_name(f"{Path(name).stem}.toml")
-
-
-def _native(path: Path, content: bytes) -> tuple[pl.DataFrame, dict[str, Any]]:
-    table, metadata = read_parquet(content, str(path), RecordingError)
-    if "hopping_leg" in metadata:
-        return table, dict(Trace.of(table, metadata, path).header)
-    return table, {}
-
-
-def _sidecar(path: Path) -> tuple[str, dict[str, Any]] | None:
-    file = sidecar_path(path)
-    if file == path or not file.is_file():
-        return None
+def _described(
+    file: Path, table: pl.DataFrame, origin: str
+) -> tuple[pl.DataFrame, RecordingMetadata]:
+    """Name a table's columns as its sidecar says; return it and the metadata."""
     try:
-        return str(file), parse_toml(file.read_bytes(), str(file), RecordingError)
+        tree = parse_toml(file.read_bytes(), str(file), RecordingError)
     except OSError as error:
         raise RecordingError(f"Cannot read {file}: {error.strerror}.") from error
-
-
-def _apply(
-    sidecar: tuple[str, dict[str, Any]], table: pl.DataFrame, origin: str
-) -> tuple[pl.DataFrame, RecordingMetadata, dict[str, str]]:
-    """Name a table's columns as its sidecar says; return it, the metadata and the file's names."""
-    file, tree = sidecar
     names = tree.pop("columns", {})
     if not isinstance(names, dict) or not all(isinstance(v, str) for v in names.values()):
         raise RecordingError(
@@ -264,17 +218,10 @@ def _apply(
     table = table.with_columns(pl.col(old).alias(new) for new, old in names.items())
     if "row" not in table.columns:
         table = table.with_columns(pl.int_range(pl.len()).alias("row"))
-    return table, read_dataclass(RecordingMetadata, tree, file, error=RecordingError), names
+    return table, _metadata(tree, str(file))
 
 
-def _cast(table: pl.DataFrame, kinds: Mapping[str, type[pl.DataType]], origin: str) -> pl.DataFrame:
-    series = []
-    for name in (name for name in kinds if name in table):
-        try:
-            series.append(table[name].cast(kinds[name]))
-        except pl.exceptions.PolarsError as error:
-            said = str(error).partition("\n")[0]
-            raise RecordingError(
-                f"{origin}: column '{name}' must hold {kinds[name]}: {said}."
-            ) from error
-    return pl.DataFrame(series)
+def _metadata(tree: object, origin: str) -> RecordingMetadata:
+    if isinstance(tree, dict):
+        tree.pop("quantisation", None)  # of the sensors, in older recordings
+    return read_dataclass(RecordingMetadata, tree, origin, error=RecordingError)

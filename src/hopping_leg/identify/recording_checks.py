@@ -5,37 +5,32 @@ every row's torque must be, k (q* - q) + d (q'* - q') + feed-forward: measured t
 where all is right, and its correlation is highest at the right row.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NoReturn
 
 import numpy as np
 import polars as pl
+from scipy import ndimage
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import RecordingError, RobotError
 from hopping_leg.identify.recording_format import MEASURED, PAIRS, RecordingMetadata, float_column
 from hopping_leg.robot import JOINTS, Robot, load_robot
 
-STALL = 2.0
-"""A gap between rows of more than this many periods is a stall."""
-FASTEST = 150.0
-"""Speed of a joint, rad/s, far beyond any leg's motor; degrees per second exceed it."""
+_FASTEST = 150.0  # rad/s, far beyond any leg's motor; degrees per second exceed it
 _TURN = 2 * np.pi
 
 
 @dataclass
 class Inspection:
-    """What the checks know; rows in messages are those of the file, the first of data being 0."""
+    """What the checks know; rows in messages are those of the file, from 0 on."""
 
     table: pl.DataFrame
     """In a recording's columns and types; null where nothing was recorded."""
     metadata: RecordingMetadata
     origin: str
     """The file, for messages."""
-    names: Mapping[str, str]
-    """The file's own column for a recording's column, where they differ."""
     warnings: list[str] = field(default_factory=list)
     """What was strange so far, a sentence each."""
 
@@ -46,11 +41,6 @@ class Inspection:
             return load_robot(self.metadata.robot)
         except (RobotError, OSError):
             return None
-
-    def named(self, column: str) -> str:
-        """Return a column as the file calls it, in quotes."""
-        own = self.names.get(column, column)
-        return f"column '{own}'" if own == column else f"column '{own}' ({column})"
 
     def row(self, index: int) -> int:
         """Return the file's row of a row of the table."""
@@ -97,45 +87,49 @@ def check_table(inspection: Inspection) -> None:
     _warn_of_stalls(inspection)
 
 
+_STALL = 2.0  # periods between rows from which on rows are missing
 _SPARSEST = 20.0  # periods per row beyond which the rate or the time's unit must be wrong
 _COUNTERS = [2.0**bits * 10.0**-n for bits in (16, 24, 31, 32) for n in (9, 6, 3, 0)] + [86400.0]
 """Where counters of nanoseconds to seconds begin anew, and the time of day, s."""
 _SOON = 5.0  # usual steps within which a wrapped clock goes on
 _ALIKE = 0.01  # periods within which two steps are one
-_COARSE, _USELESS = 0.15, 0.3  # periods that a clock's tick may last: with a warning, and at all
+_COARSE = 0.3  # periods that a clock's tick may last
 
 
-def row_period(time: Array, period: float) -> float:
-    """Return the usual time from row to row, s: the nominal period, or more in a sparse log."""
-    return max(period, float(np.median(np.diff(time)))) if len(time) > 1 else period
+def stalls(time: Array, period: float) -> IntArray:
+    """Return the rows after which rows are missing; a sparse log's usual step is its period, s."""
+    steps = np.diff(time)
+    usual = max(period, float(np.median(steps))) if len(steps) else period
+    return np.flatnonzero(steps > _STALL * usual)
 
 
 def _check_clock(inspection: Inspection) -> None:
     """Refuse time that is missing, not increasing, too coarse or in another unit."""
-    time, where = inspection.floats("time_s"), inspection.named("time_s")
+    time = inspection.floats("time_s")
     bad = np.flatnonzero(~np.isfinite(time))
     if len(bad):
-        inspection.refuse(f"{where} has no time in row {inspection.row(bad[0])}")
+        inspection.refuse(f"column 'time_s' has no time in row {inspection.row(bad[0])}")
     _unwrap_time(inspection, time)
     steps, metadata = np.diff(time), inspection.metadata
     if not len(steps):
         return
     tick = _tick(steps, metadata.period)
     if tick > _COARSE * metadata.period:
-        sentence = f"{where} is too coarse: it counts in {tick * 1e3:.4g} ms, where a row takes"
-        sentence += f" {metadata.period * 1e3:.4g}; record it to a tenth of that"
-        (inspection.refuse if tick > _USELESS * metadata.period else inspection.warn)(sentence)
+        inspection.refuse(
+            f"column 'time_s' is too coarse: it counts in {tick * 1e3:.4g} ms, where a row takes"
+            f" {metadata.period * 1e3:.4g}; record it to a tenth of that"
+        )
     back = np.flatnonzero(steps <= 0)
     if len(back):
         index = back[0] + 1
         inspection.refuse(
-            f"{where} does not increase in row {inspection.row(index)}: {time[index]:.9g} s comes"
-            f" after {time[index - 1]:.9g} s; remove the row, or split the file there"
+            f"column 'time_s' does not increase in row {inspection.row(index)}:"
+            f" {time[index]:.9g} s comes after {time[index - 1]:.9g} s; split the file there"
         )
     step = float(np.median(steps))
     if not 0.5 <= step * metadata.rate_hz <= _SPARSEST:
         inspection.refuse(
-            f"{where} steps by {step:.3g} from row to row but the metadata's rate_hz ="
+            f"column 'time_s' steps by {step:.3g} from row to row but the metadata's rate_hz ="
             f" {metadata.rate_hz:g} means {metadata.period:.3g} s; one of the two is wrong"
         )
 
@@ -144,15 +138,13 @@ def _unwrap_time(inspection: Inspection, time: Array) -> None:
     """Let time, (ticks,), go on where its counter began anew."""
     steps = np.diff(time)
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-    wraps: list[str] = []
+    wraps = 0
     for index in np.flatnonzero(steps < 0).tolist():
-        turns = [c for c in _COUNTERS if 0 < steps[index] + c < _SOON * usual]
-        if turns:
-            time[index + 1 :] += turns[0]
-            wraps.append(f"{turns[0]:.10g} s before row {inspection.row(index + 1)}")
+        turn = next((c for c in _COUNTERS if 0 < steps[index] + c < _SOON * usual), 0.0)
+        time[index + 1 :] += turn
+        wraps += turn > 0
     if wraps:
-        counted = f"{inspection.named('time_s')} is a counter that begins anew at"
-        inspection.warn(f"{counted} {', '.join(wraps[:3])}; it was made to go on")
+        inspection.warn(f"column 'time_s' began anew {wraps} times; it was made to go on")
         inspection.set("time_s", time)
 
 
@@ -171,19 +163,16 @@ def _tick(steps: Array, period: float) -> float:
 def _warn_of_stalls(inspection: Inspection) -> None:
     """Say where rows are missing; windows do not reach across."""
     time = inspection.floats("time_s")
-    steps, period = np.diff(time), row_period(time, inspection.metadata.period)
-    stalls = np.flatnonzero(steps > STALL * period)
-    for stall in stalls[:3]:
+    found, steps = stalls(time, inspection.metadata.period), np.diff(time)
+    if len(found):
+        worst = int(found[np.argmax(steps[found])])
         inspection.warn(
-            f"{inspection.named('time_s')}: stall of {steps[stall] * 1e3:.1f} ms,"
-            f" {steps[stall] / period:.1f} periods, before row {inspection.row(stall + 1)}"
+            f"column 'time_s': stall of {steps[worst] * 1e3:.1f} ms before row"
+            f" {inspection.row(worst + 1)}, the longest of {len(found)}"
         )
-    if len(stalls) > 3:
-        inspection.warn(f"{inspection.named('time_s')}: {len(stalls) - 3} further stalls")
 
 
 _TINY, _HUGE = 1e-30, 1e30  # uninitialised memory read as a float is beyond, no sensor's value is
-_MOSTLY = 0.1  # share of garbage above which nothing in a column is believed
 _WOKEN = 0.05  # step out of rows of zeros, rad, that only a sensor that woke up makes
 
 
@@ -194,24 +183,15 @@ def _drop_garbage(inspection: Inspection) -> None:
         size = np.abs(values)
         garbage = ((size > 0) & (size < _TINY)) | (size > _HUGE)
         if garbage.any():
-            first, most = int(np.argmax(garbage)), garbage.mean() > _MOSTLY
             inspection.warn(
-                f"{inspection.named(column)}, row {inspection.row(first)}:"
-                f" {values[first]:.3g} is no measurement but uninitialised memory"
-                f" ({int(garbage.sum())} such values);{' the column is' if most else ''} left out"
+                f"column '{column}' holds uninitialised memory in {garbage.sum()} rows,"
+                f" first in row {inspection.row(int(np.argmax(garbage)))}; left out"
             )
-            inspection.set(column, np.where(garbage | most, np.nan, values))
-    asked = "torque_command" if inspection.metadata.onboard == "torque" else "position_command"
-    for column in (*MEASURED, *PAIRS[asked]):
-        values = inspection.floats(column)
-        if np.isnan(values).all() or np.nanmax(np.abs(values)) > 0:
-            continue
-        sentence = f"{inspection.named(column)} is zero in all rows from {inspection.row(0)} on"
-        if column in MEASURED:
-            inspection.warn(f"{sentence}: not recorded, left out")
+            values[garbage] = np.nan
+            inspection.set(column, values)
+        if column in MEASURED and not np.nan_to_num(values).any() and (values == 0).any():
+            inspection.warn(f"column '{column}' is zero in all rows: left out")
             inspection.set(column, np.full_like(values, np.nan))
-        else:  # a command may well be zero
-            inspection.warn(f"{sentence}: kept as a command of zero")
 
 
 def _drop_startup(inspection: Inspection) -> None:
@@ -242,35 +222,23 @@ def _align_commands(inspection: Inspection) -> None:
 
 _LEAST_ROWS = 20  # rows with a position that a recording needs
 _LEAST_MOTION = 0.02  # motion of the joint that moves more, rad; below it nothing can be identified
-_SMALL_MOTION = 0.5  # below it, rad, positions may be revolutions
 
 
 def _check_motion(inspection: Inspection) -> None:
-    """Refuse recordings that are too short or at rest, and say which joint was not recorded."""
+    """Refuse recordings that are too short or at rest."""
     spans = {}
     for column in PAIRS["position"]:
         values = inspection.floats(column)
-        known = np.count_nonzero(~np.isnan(values))
-        if known >= _LEAST_ROWS:
+        if np.count_nonzero(~np.isnan(values)) >= _LEAST_ROWS:
             spans[column] = float(np.nanmax(values) - np.nanmin(values))
-        elif not known:
-            inspection.warn(f"{inspection.named(column)} was not recorded")
     if not spans:
         inspection.refuse(
             f"it is too short: {inspection.table.height} rows, and no joint has {_LEAST_ROWS}"
-            f" positions ({' or '.join(map(inspection.named, PAIRS['position']))})"
+            f" values of {' or '.join(PAIRS['position'])}"
         )
     widest = max(spans, key=spans.__getitem__)
     if spans[widest] < _LEAST_MOTION:
-        inspection.refuse(
-            f"the leg is at rest: {inspection.named(widest)} spans {spans[widest]:.2g} rad;"
-            f" nothing can be identified below {_LEAST_MOTION:g} rad, play an excitation"
-        )
-    if spans[widest] < _SMALL_MOTION:
-        inspection.warn(
-            f"{inspection.named(widest)} spans only {spans[widest]:.2g}; check that it is in rad,"
-            " not in revolutions"
-        )
+        inspection.refuse(f"the leg is at rest: column '{widest}' spans {spans[widest]:.2g} rad")
 
 
 _NEAR = 0.02  # s, within which no joint turns by half a turn
@@ -300,7 +268,7 @@ def _unwrap_angles(inspection: Inspection) -> None:
             values[known[1:]] -= _TURN * np.cumsum(turns)
             inspection.set(column, values)
             inspection.warn(
-                f"{inspection.named(column)} wraps {np.count_nonzero(turns)} times, first before"
+                f"column '{column}' wraps {np.count_nonzero(turns)} times, first before"
                 f" row {inspection.row(known[np.argmax(turns != 0) + 1])}; it was made to go on"
             )
 
@@ -311,21 +279,16 @@ def _drop_spikes(inspection: Inspection, column: str, least: float, often: float
     if len(known) < _LEAST_ROWS:
         return
     far = max(least, often * float(np.quantile(np.abs(steps), 0.98)))
-    near = np.append(times < 2 * np.median(np.diff(inspection.floats("time_s"))), False)
-    values = inspection.floats(column)
-    seen, out = values[known], list[int]()
-    for leap in np.flatnonzero(np.abs(steps) > far).tolist():
-        if out and leap <= out[-1]:
-            continue
-        for last in range(leap + 1, min(leap + 1 + _SHORT, len(seen) - 1)):
-            away = np.abs(seen[leap + 1 : last + 1] - seen[leap])
-            if abs(seen[last + 1] - seen[leap]) < away.min() / 2 and near[leap : last + 1].all():
-                out += range(leap + 1, last + 1)
-                break
+    values, around = inspection.floats(column), 2 * _SHORT + 1
+    seen = values[known]
+    lasts = ndimage.maximum_filter1d(np.append(times, 0.0), around, mode="nearest")
+    near = lasts < 2 * np.median(np.diff(inspection.floats("time_s")))
+    leads = np.abs(seen - ndimage.median_filter(seen, around, mode="nearest")) > far
+    out = np.flatnonzero(leads & near).tolist()
     if out:
         rows = ", ".join(str(inspection.row(row)) for row in known[out[:5]])
         inspection.warn(
-            f"{inspection.named(column)} leads far away and back at once in {len(out)} rows"
+            f"column '{column}' leads far away and back at once in {len(out)} rows"
             f" ({rows}{', ...' if len(out) > 5 else ''}): spikes, left out"
         )
         values[known[out]] = np.nan
@@ -336,12 +299,12 @@ def _check_jumps(inspection: Inspection) -> None:
     """Refuse angles that jump, or are beyond the robot's mechanical stops."""
     for name, column in zip(JOINTS, PAIRS["position"], strict=True):
         known, steps, times = _steps(inspection, column)
-        leaps = np.flatnonzero(np.abs(steps) > np.maximum(_LEAP, FASTEST * times))
+        leaps = np.flatnonzero(np.abs(steps) > np.maximum(_LEAP, _FASTEST * times))
         if len(leaps):
             inspection.refuse(
-                f"{inspection.named(column)} jumps by {steps[leaps[0]]:.3g} rad before row"
-                f" {inspection.row(known[leaps[0] + 1])} ({len(leaps)} such jumps): its counter"
-                " wraps, or the encoder lost its place; make it go on, or split the file there"
+                f"column '{column}' jumps by {steps[leaps[0]]:.3g} rad before row"
+                f" {inspection.row(known[leaps[0] + 1])} ({len(leaps)} such jumps); make it go on,"
+                " or split the file there"
             )
         if (robot := inspection.robot) is None:
             continue
@@ -350,20 +313,14 @@ def _check_jumps(inspection: Inspection) -> None:
         beyond = np.flatnonzero((q < low) | (q > high))
         if len(beyond) and high - low < _TURN:
             inspection.refuse(
-                f"{inspection.named(column)} is {q[beyond[0]]:.3g} rad in row"
+                f"column '{column}' is {q[beyond[0]]:.3g} rad in row"
                 f" {inspection.row(beyond[0])}, but the {name} of '{robot.name}' ends at"
-                f" {joint.stop_lower:g} and {joint.stop_upper:g}; is its sign or zero"
-                " another, or is it another robot's?"
+                f" {joint.stop_lower:g} and {joint.stop_upper:g}; check sign, zero and robot"
             )
 
 
 _COMMON_PEAK = 60.0  # peak torque where the robot is unknown, N m
-_SIZES = {
-    "position": (12.5, "rad", "degrees"),  # two turns from the middle
-    "velocity": (FASTEST, "rad/s", "degrees/s"),
-    "torque": (5.0, "N m", "mN m"),  # times the motor's peak
-}
-"""The largest magnitude of a quantity in its unit, and what exceeds it."""
+_FARTHEST = 12.5  # two turns from the middle, rad
 _HIGHEST = 5.0  # base height, m; millimetres exceed it
 
 
@@ -373,10 +330,11 @@ def _check_sizes(inspection: Inspection) -> None:
     if (robot := inspection.robot) is not None:
         peaks = [j.motor.peak_torque * j.belt_ratio for j in (robot.hip, robot.knee)]
     columns = {"height_m": (_HIGHEST, "m", "mm"), "base_rise_m": (_HIGHEST, "m", "mm")}
-    for quantity, (most, unit, guess) in _SIZES.items():
-        for name in (quantity, f"{quantity}_command"):
-            for column, peak in zip(PAIRS[name], peaks, strict=True):
-                columns[column] = (most * peak if quantity == "torque" else most, unit, guess)
+    for joint, peak in enumerate(peaks):
+        for kind in ("", "_command"):
+            columns[PAIRS[f"position{kind}"][joint]] = (_FARTHEST, "rad", "degrees")
+            columns[PAIRS[f"velocity{kind}"][joint]] = (_FASTEST, "rad/s", "degrees/s")
+            columns[PAIRS[f"torque{kind}"][joint]] = (5.0 * peak, "N m", "mN m")
     for column, (most, unit, guess) in columns.items():
         values = inspection.floats(column)
         if np.isnan(values).all():
@@ -385,68 +343,46 @@ def _check_sizes(inspection: Inspection) -> None:
         worst = int(np.nanargmax(np.abs(values - middle)))
         if abs(values[worst] - middle) > most:
             inspection.refuse(
-                f"{inspection.named(column)} cannot be in {unit}: row {inspection.row(worst)} holds"
+                f"column '{column}' cannot be in {unit}: row {inspection.row(worst)} holds"
                 f" {values[worst]:.4g}; is it in {guess}? Convert it"
             )
 
 
-_FACTORS = (180 / np.pi, 1 / _TURN, np.pi / 180, _TURN, _TURN / 60)
-"""Way over integral of a velocity in degrees, revolutions or rpm, or of such positions."""
 _LIKE = 0.9  # correlation above which a velocity is the derivative, maybe in another unit
 _OFF = 0.25  # share by which it may be another all the same: sparse logs are interpolated
+_OTHER_UNIT = 3.0  # factor that degrees, revolutions and rpm are all beyond
 _BLOCK = 0.05  # integration of velocity, s; shorter blocks would compare quantisation
 _LEAST_BLOCKS = 20
 _LEAST_WAY = 5e-3  # root mean square way within a block below which nothing can be said, rad
-_GAP = 0.2  # longest time between two velocities that is integrated across, s
 
 
 def _check_velocity(inspection: Inspection, placed: str, moving: str) -> None:
     """Leave out a velocity that is not the derivative of its position; refuse other units."""
-    compared = _way_and_integral(inspection, placed, moving)
-    if compared is None:
+    time, position, velocity = map(inspection.floats, ("time_s", placed, moving))
+    moves, known = (np.flatnonzero(~np.isnan(v)) for v in (velocity, position))
+    if min(len(moves), len(known)) < 2:
         return
-    way, integral = compared
-    power, both = float(integral @ integral), float(integral @ way)
-    if not power:
+    filled = np.interp(time, time[moves], velocity[moves])
+    integral = np.append(0.0, np.cumsum((filled[1:] + filled[:-1]) / 2 * np.diff(time)))
+    starts = np.arange(time[moves[0]], time[moves[-1]], _BLOCK)
+    edges = known[np.unique(np.searchsorted(time[known], starts).clip(max=len(known) - 1))]
+    whole = (np.diff(time[edges]) < 2 * _BLOCK) & (np.diff(np.searchsorted(moves, edges)) > 0)
+    way, expected = np.diff(position[edges])[whole], np.diff(integral[edges])[whole]
+    if len(way) < _LEAST_BLOCKS or np.sqrt(np.mean(way**2)) < _LEAST_WAY or not expected.any():
         return
+    both, power = float(way @ expected), float(expected @ expected)
     factor, alike = both / power, both / float(np.sqrt(power * (way @ way)))
     found = f"(way over integral {factor:.3g}, correlation {alike:.2f})"
-    if alike >= _LIKE and any(abs(factor / f - 1) < 0.1 for f in _FACTORS):
+    if alike >= _LIKE and not 1 / _OTHER_UNIT < factor < _OTHER_UNIT:
         inspection.refuse(
-            f"{inspection.named(placed)} or {inspection.named(moving)} seems to be in degrees,"
+            f"column '{placed}' or column '{moving}' seems to be in degrees,"
             f" revolutions or rpm {found}; convert to rad and rad/s"
         )
     if abs(factor - 1) > _OFF or alike < _LIKE:
         inspection.warn(
-            f"{inspection.named(moving)} is not the derivative of {inspection.named(placed)}"
-            f" {found}; left out"
+            f"column '{moving}' is not the derivative of column '{placed}' {found}; left out"
         )
         inspection.set(moving, np.full(inspection.table.height, np.nan))
-
-
-def _way_and_integral(
-    inspection: Inspection, placed: str, moving: str
-) -> tuple[Array, Array] | None:
-    """Return ways in blocks of time and the integrals of velocity there; None if too few tell."""
-    time, position, velocity = map(inspection.floats, ("time_s", placed, moving))
-    moves = np.flatnonzero(~np.isnan(velocity))
-    if len(moves) < 2:
-        return None
-    filled = np.interp(time, time[moves], velocity[moves])
-    integral = np.append(0.0, np.cumsum((filled[1:] + filled[:-1]) / 2 * np.diff(time)))
-    runs = np.append(0, np.cumsum(np.diff(time[moves]) > _GAP))
-    known = np.flatnonzero(~np.isnan(position))
-    known = known[(known >= moves[0]) & (known <= moves[-1])]
-    run = runs[np.searchsorted(moves, known, side="right") - 1]
-    late = np.searchsorted(time[known], time[known] + _BLOCK)
-    early = np.flatnonzero(late < len(known))
-    late = late[early]
-    whole = (run[late] == run[early]) & (time[known[late]] - time[known[early]] < 2 * _BLOCK)
-    begin, end = known[early[whole]], known[late[whole]]
-    way, expected = position[end] - position[begin], integral[end] - integral[begin]
-    if len(way) < _LEAST_BLOCKS or np.sqrt(np.mean(way**2)) < _LEAST_WAY:
-        return None
-    return way, expected
 
 
 _LEAST_TORQUES = 50
@@ -462,7 +398,7 @@ _RATIOS = {False: (0.75, 1.33), True: (0.4, 2.5)}
 
 def _check_torque(inspection: Inspection, joint: int) -> None:
     """Refuse a torque that contradicts what was asked for; doubt one that comes late."""
-    metadata, named = inspection.metadata, inspection.named(PAIRS["torque"][joint])
+    metadata, named = inspection.metadata, f"column '{PAIRS['torque'][joint]}'"
     commanded = metadata.onboard == "torque"
     right = 1 if metadata.onboard == "zoh" else 0
     asked, measured = _asked(inspection, joint), inspection.floats(PAIRS["torque"][joint])
@@ -475,14 +411,14 @@ def _check_torque(inspection: Inspection, joint: int) -> None:
     if correlation < _OPPOSED:
         inspection.refuse(
             f"{named} has the opposite sign of what was asked for (correlation {correlation:.2f});"
-            " a positive torque accelerates towards positive angles, turn its sign round"
+            " a positive torque accelerates towards positive angles"
         )
     exact, (low, high) = commanded or metadata.gains_exact, _RATIOS[commanded]
     if exact and correlation > _ALIKE_TORQUE and not (least < high and most > low):
         inspection.refuse(
             f"{named} is {np.sqrt(abs(least * most)):.3g} times what was asked for, maybe in"
-            " amperes, at the motor's side of a gear or belt, or with other gains; give torques in"
-            " N m at the joint, and gains likewise"
+            " amperes, at the motor's side of a gear or belt, or with other gains; give all of"
+            " them in N m at the joint"
         )
     if commanded or not exact:
         return

@@ -1,6 +1,8 @@
 """What a recording holds: its columns, and the metadata that its rows do not say."""
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -56,19 +58,32 @@ def float_column(table: pl.DataFrame, column: str) -> Array:
     return np.array(table[column].cast(pl.Float64).to_numpy())
 
 
+def cast(
+    table: pl.DataFrame, kinds: Mapping[str, type[pl.DataType]], origin: str | Path
+) -> pl.DataFrame:
+    """Return the columns of these kinds, or raise RecordingError for one that holds others."""
+    series = []
+    for name in (name for name in kinds if name in table):
+        try:
+            series.append(table[name].cast(kinds[name]))
+        except pl.exceptions.PolarsError as error:
+            said = str(error).partition("\n")[0]
+            raise RecordingError(
+                f"{origin}: column '{name}' must hold {kinds[name]}: {said}."
+            ) from error
+    return pl.DataFrame(series)
+
+
+def sidecar_path(path: Path) -> Path:
+    """Return where a table's sidecar would be."""
+    name = path.name.removesuffix(".gz")
+    return path.with_name(f"{Path(name).stem}.toml")
+
+
 Rig = Literal["fixed-base", "rail", "boom"]
 Sample = Literal["before-command", "after-command"]
 Onboard = Literal["torque", "zoh", "continuous"]
 Pair = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Quantisation:
-    """Steps of the sensors, rad, rad/s and N m; 0 where they are too fine to matter."""
-
-    position: float = 0.0
-    velocity: float = 0.0
-    torque: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -104,7 +119,6 @@ class RecordingMetadata:
     """Largest torque the rig let through, N m at the joint; none takes the robot file's."""
     startup_rows: int = 0
     """First rows of the file whose commands were not applied; the loader leaves them out."""
-    quantisation: Quantisation = field(default_factory=Quantisation)
 
     def __post_init__(self) -> None:
         for name in ("rate_hz", "effective_gravity"):

@@ -41,7 +41,6 @@ SPAN = np.dtype([(name, np.int64) for name in ("start", "length", "first", "reco
 DRIVE = np.dtype(
     [
         ("delay", np.float64),
-        ("velocity_window", np.float64),
         ("ramp", np.float64),
         ("gains", np.float64, (6,)),  # NaN as recorded
     ]
@@ -53,7 +52,6 @@ RESULT = 7
 
 _WILD = 1e4  # joint velocity beyond which a simulation has broken down, rad/s
 _SOON = 1e-9  # s, within which moments are the same
-_PAST = 256  # physics steps that a drive's mean velocity may look back
 
 
 @inlined
@@ -118,11 +116,10 @@ def _replay_window(
     memory.rotor[2], memory.rotor[3] = state[4], state[5]
     scratch, none = np.empty((ROWS, 5)), np.empty((0, 6))
     seen, target, integral = np.empty(4), np.zeros(2), np.zeros(2)
-    zoh, delay, window = onboard == ZOH, drive.delay, drive.velocity_window
+    zoh, delay = onboard == ZOH, drive.delay
     start, length, dt = span.start, span.length, timestep
-    lags = onboard == CONTINUOUS and window > 0
     sums = _gain(rows[start], drive, 4) != 0 or _gain(rows[start], drive, 5) != 0
-    moves = onboard == CONTINUOUS and (lags or sums or drive.ramp != 0)
+    moves = onboard == CONTINUOUS and (sums or drive.ramp != 0)
 
     # The newest command that has arrived before the window; a held PD saw the measured state.
     row = start
@@ -133,10 +130,6 @@ def _replay_window(
     for k in range(oldest, start):
         if zoh:
             _hold(rows[k], drive, rows[k].state, held[k - oldest])
-    past, count = np.empty((_PAST, 2)), 0
-    for k in range(_PAST):
-        past[k, 0] = state[1] - (_PAST - k) * dt * state[4]
-        past[k, 1] = state[2] - (_PAST - k) * dt * state[5]
 
     command = memory.command
     for n in range(length):
@@ -189,14 +182,6 @@ def _replay_window(
             for joint in range(2):
                 if sums:
                     command[joint] += _gain(rows[newest], drive, 4 + joint) * integral[joint]
-                if lags:
-                    back = min(window / dt, _PAST - 2.0)
-                    whole = int(back)
-                    near = past[(count - whole) % _PAST, joint] if whole else seen[joint]
-                    far = past[(count - whole - 1) % _PAST, joint]
-                    speed = (seen[joint] - near - (back - whole) * (far - near)) / (back * dt)
-                    command[joint] -= command[6 + joint] * speed
-                    command[6 + joint] = 0.0
             if step == -1:
                 for joint in range(2):
                     angle, speed = seen[joint], seen[2 + joint]
@@ -210,8 +195,6 @@ def _replay_window(
             if step < 0:
                 many, where = 1, state.copy()
             elif moves:
-                past[count % _PAST] = seen[:2]
-                count += 1
                 integral += dt * (target - seen[:2])
             step_leg(p, where, memory, none, scratch, 0.0, many, dt)
             if step < 0:  # a state's speeds belong half a step before

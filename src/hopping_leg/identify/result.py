@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.errors import UsageError
 from hopping_leg.identify import optimizers, recording_format
 from hopping_leg.identify.identifiability import Identifiability
 from hopping_leg.identify.parameters import LegHypothesis
@@ -17,11 +16,15 @@ from hopping_leg.identify.plan import FitPlan
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.validation import Validation
 from hopping_leg.io import plain, replace_at, versions, write_atomically
-from hopping_leg.robot import JOINTS, Robot, load_tree, robot_from_tree, robot_text
+from hopping_leg.robot import COARSE_TIMESTEP, JOINTS, Robot, load_tree, robot_from_tree, robot_text
 
 _LATENCY = "reality.latency.command"
 _WORSE = 1.01
 """Geometric mean of errors after the fit over those before, from which on it is worse."""
+PARAMETERS = ("parameter", "start", "identified", "95 % interval", "unit")
+"""What is shown of each parameter."""
+ERRORS = ("on held-out data, rms", "before: hip", "knee", "after: hip", "knee", "unit")
+"""What is shown of each kind of error."""
 _SHARES = ("load_friction", "ramp")
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "scipy", "cma", "polars")
 
@@ -59,12 +62,7 @@ class Identified:
 
         Their quantiles are the intervals, as far as these lie within the bounds of the search,
         where draws beyond them end; what the data say nothing about is drawn from all between.
-
-        Raises:
-            UsageError: The count or the seed is negative.
         """
-        if count < 0 or seed < 0:
-            raise UsageError("The number of draws and their seed must not be negative.")
         known, rng = self.identifiability, np.random.default_rng(seed)
         searched = self.passes[-1].parameters
         low, high = (searched.values(bound) for bound in searched.bounds)
@@ -86,9 +84,9 @@ def as_json(identified: Identified, posterior: int = 0) -> dict[str, Any]:
         "robot": identified.start.robot.name,
         "robot_digest_before": identified.start.robot.digest,
         "robot_digest": identified.robot.digest,
-        "validation": validation_json(identified.validation),
-        "start_validation": validation_json(identified.start_validation),
-        "validation_by_rig": {r: validation_json(v) for r, v in identified.by_rig.items()},
+        "validation": asdict(identified.validation),
+        "start_validation": asdict(identified.start_validation),
+        "validation_by_rig": {rig: asdict(v) for rig, v in identified.by_rig.items()},
         "quality": quality_json(identified),
         "warning": warning(identified),
         "parameters": parameters_json(identified),
@@ -100,7 +98,7 @@ def as_json(identified: Identified, posterior: int = 0) -> dict[str, Any]:
             "window_s": plan.window,
             "stride_s": plan.window,
             "unscored_s": plan.unscored,
-            "timestep_s": plan.timestep,
+            "timestep_s": COARSE_TIMESTEP,
             "passes": [
                 {
                     "name": one.name,
@@ -108,13 +106,23 @@ def as_json(identified: Identified, posterior: int = 0) -> dict[str, Any]:
                     "cost": one.found.cost,
                     "candidates": one.found.evaluations,
                     "history": one.found.history,
-                    "other_starts": list(one.others),
                 }
                 for one in identified.passes
             ],
         },
         "recordings": [
-            _recording_json(recording, use)
+            {
+                "name": recording.name,
+                "use": use,
+                "sha256": recording.digest,
+                "rows": len(recording),
+                "first_s": float(recording.time[0]),
+                "last_s": float(recording.time[-1]),
+                "rig": recording.metadata.rig,
+                "rate_hz": recording.metadata.rate_hz,
+                "source": recording.metadata.source,
+                "warnings": list(recording.warnings),
+            }
             for use, recordings in (("fit", identified.fit), ("judge", identified.held))
             for recording in recordings
         ],
@@ -123,24 +131,12 @@ def as_json(identified: Identified, posterior: int = 0) -> dict[str, Any]:
         "versions": software_versions(),
     }
     if posterior:
-        parameters = identified.passes[-1].parameters.parameters
         tree["posterior"] = {
             "names": known.names,
-            "units": [p.unit for p in parameters],
+            "units": [p.unit for p in identified.passes[-1].parameters.parameters],
             "samples": identified.posterior(posterior, identified.seed).tolist(),
         }
     return dict(plain(tree))
-
-
-def validation_json(validation: Validation) -> dict[str, Any]:
-    """Return a validation under the names that other tools rely on, each value (hip, knee)."""
-    return {
-        "closed_loop_position_rms_rad": list(validation.closed_loop_position),
-        "closed_loop_torque_rms_nm": list(validation.closed_loop_torque),
-        "open_loop_position_rms_rad": {
-            f"{horizon:.1f}": list(pair) for horizon, pair in validation.open_loop_position.items()
-        },
-    }
 
 
 def quality_json(identified: Identified) -> list[dict[str, Any]]:
@@ -150,12 +146,14 @@ def quality_json(identified: Identified) -> list[dict[str, Any]]:
     """
     before, after = identified.start_validation, identified.validation
     rows = [
-        ("position, closed loop", "rad", before.closed_loop_position, after.closed_loop_position),
-        ("torque, closed loop", "N m", before.closed_loop_torque, after.closed_loop_torque),
-    ]
-    for horizon, pair in before.open_loop_position.items():
-        name = f"position, predicted {horizon:g} s ahead"
-        rows.append((name, "rad", pair, after.open_loop_position[horizon]))
+        ("position, closed loop", "rad", before.closed_loop_position_rms_rad,
+         after.closed_loop_position_rms_rad),
+        ("torque, closed loop", "N m", before.closed_loop_torque_rms_nm,
+         after.closed_loop_torque_rms_nm),
+    ]  # fmt: skip
+    for horizon, pair in before.open_loop_position_rms_rad.items():
+        name = f"position, predicted {float(horizon):g} s ahead"
+        rows.append((name, "rad", pair, after.open_loop_position_rms_rad[horizon]))
     keys = ("hip_before", "knee_before", "hip_after", "knee_after")
     return [
         {"error": name, "unit": unit, **dict(zip(keys, (*first, *second), strict=True))}
@@ -207,24 +205,38 @@ def parameters_json(identified: Identified) -> list[dict[str, Any]]:
     ]
 
 
+def shown_parameters(identified: Identified) -> list[tuple[str, ...]]:
+    """Return a row of texts per parameter, in the columns of ``PARAMETERS``."""
+    return [
+        (
+            row["name"],
+            f"{row['start']:.4g}",
+            f"{row['value']:.4g}{' (at bound)' if row['at_bound'] else ''}",
+            f"{row['interval_low']:.4g} .. {row['interval_high']:.4g}"
+            if math.isfinite(row["interval_high"])
+            else "unknown",
+            row["unit"],
+        )
+        for row in parameters_json(identified)
+    ]
+
+
+def shown_errors(identified: Identified) -> list[tuple[str, ...]]:
+    """Return a row of texts per kind of error, in the columns of ``ERRORS``."""
+    rows = []
+    for row in quality_json(identified):
+        unit, factor = ("mrad", 1e3) if row["unit"] == "rad" else (row["unit"], 1.0)
+        values = [
+            factor * row[f"{joint}_{when}"] for when in ("before", "after") for joint in JOINTS
+        ]
+        shown = (f"{value:.3g}" if math.isfinite(value) else "-" for value in values)
+        rows.append((row["error"], *shown, unit))
+    return rows
+
+
 def software_versions() -> dict[str, str]:
     """Return the versions that the numbers may depend on."""
     return versions(*_LIBRARIES)
-
-
-def _recording_json(recording: Recording, use: str) -> dict[str, Any]:
-    return {
-        "name": recording.name,
-        "use": use,
-        "sha256": recording.digest,
-        "rows": len(recording),
-        "first_s": float(recording.time[0]),
-        "last_s": float(recording.time[-1]),
-        "rig": recording.metadata.rig,
-        "rate_hz": recording.metadata.rate_hz,
-        "source": recording.metadata.source,
-        "warnings": list(recording.warnings),
-    }
 
 
 def save_robot(identified: Identified, path: Path, origin: str | Path) -> None:
@@ -255,29 +267,30 @@ def _place(name: str) -> str:
     return _LATENCY if name == "drive.delay" else name
 
 
-def _comment(identified: Identified, origin: str) -> str:
-    """Return what stands above the tables: provenance, quality, and what stays unknown."""
-    lines = [text for text in (warning(identified),) if text]
-    lines += [f"Identified by `hop identify` from {origin}; numbers without 'identified' are its."]
-    for use, recordings in (("Fitted to", identified.fit), ("Judged by", identified.held)):
-        lines += [f"{use}: {r.name}, sha256 {r.digest or 'unknown'}" for r in recordings]
-    lines.append(f"Split: {identified.split}; seed {identified.seed}; {identified.plan.search}.")
-    libraries = software_versions().items()
-    lines.append("Versions: " + ", ".join(f"{name} {value}" for name, value in libraries) + ".")
-    lines.append("Error on what judged (rms; hip, knee), before and after the fit:")
-    lines += [
-        "  {error}: {hip_before:.3g}, {knee_before:.3g} and {hip_after:.3g}, {knee_after:.3g}"
-        " {unit}".format(**row)
-        for row in quality_json(identified)
+def provenance(identified: Identified) -> list[str]:
+    """Return what an identification was made from, by what, a line each."""
+    lines = [
+        f"{use}: {recording.name}, sha256 {recording.digest or 'unknown'}"
+        for use, some in (("Fitted to", identified.fit), ("Judged by", identified.held))
+        for recording in some
     ]
+    libraries = ", ".join(f"{name} {value}" for name, value in software_versions().items())
+    how = f"{identified.plan.search}, {identified.split}, seed {identified.seed}"
+    return [*lines, f"{how}; {libraries}."]
+
+
+def _comment(identified: Identified, origin: str) -> str:
+    """Return what stands above the tables: provenance, quality, and the drives' numbers."""
     drives = [r for r in parameters_json(identified) if _place(r["name"]).startswith("drive.")]
-    if drives:
-        lines.append("Of the recordings' drives, which are no part of the robot:")
-        lines += [f"  {r['name']} = {r['value']:.6g} {r['unit']} ({_source(r)})" for r in drives]
-    if identified.identifiability.statements:
-        lines.append("What these data cannot tell:")
-        lines += [f"  {sentence}" for sentence in identified.identifiability.statements]
-    return "\n".join(lines)
+    lines = [
+        warning(identified),
+        f"Identified by `hop identify` from {origin}; numbers without 'identified' are its.",
+        *provenance(identified),
+        *(", ".join(row) for row in (ERRORS, *shown_errors(identified))),
+        *(f"  {r['name']} = {r['value']:.6g} {r['unit']} ({_source(r)})" for r in drives),
+        *identified.identifiability.statements,
+    ]
+    return "\n".join(filter(None, lines))
 
 
 def _source(row: dict[str, Any]) -> str:

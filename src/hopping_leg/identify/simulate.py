@@ -15,6 +15,7 @@ from hopping_leg.arrays import Array, Records
 from hopping_leg.errors import RecordingError, UsageError
 from hopping_leg.identify import initial_states, parameters, replay
 from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.recording_format import float_column
 from hopping_leg.robot import COARSE_TIMESTEP, Robot, kinematics
 from hopping_leg.sim.compiled import announce
 from hopping_leg.sim.leg_table import LEG, leg_table
@@ -90,17 +91,8 @@ def _drive_values(hypotheses: Sequence[parameters.LegHypothesis], name: str) -> 
     return np.array([[getattr(h.drive.hip, name), getattr(h.drive.knee, name)] for h in hypotheses])
 
 
-def _recorded_gains(recording: Recording, name: str) -> Array:
-    """Return a gain of the on-board PD, (rows, 2), NaN if unknown; rows win over the metadata."""
-    pair = getattr(recording.metadata, name)
-    if name == "integral":
-        return np.tile(pair or (0.0, 0.0), (len(recording), 1))
-    rows = recording.array(name)
-    return np.where(np.isnan(rows), pair or (np.nan, np.nan), rows)
-
-
 class _WindowGroup:
-    """Windows that share rig, on-board controller and gravity; arguments as ``WindowSimulator``."""
+    """Windows of one kind of recording; arguments as ``WindowSimulator``."""
 
     def __init__(
         self,
@@ -115,10 +107,7 @@ class _WindowGroup:
         self._metadata = self._recordings[0].metadata
         period = min(r.metadata.period for r in self._recordings)
         if timestep > period * 1.001:
-            raise UsageError(
-                f"A physics step of {timestep} s is longer than the recordings' period of"
-                f" {period:g} s; take {period:g} s or less."
-            )
+            raise UsageError(f"A physics step of {timestep} s is longer than {period:g} s, a row.")
         self._of_window = np.array([numbers.index(w.recording) for w in windows])
         starts = np.cumsum([0, *map(len, self._recordings)])
         self._spans = np.zeros(len(windows), replay.SPAN)
@@ -128,25 +117,18 @@ class _WindowGroup:
         self._spans["length"] = [w.length for w in windows]
         self._rows = np.concatenate([_recorded_rows(r) for r in self._recordings])
         self._moving = self._metadata.rig != "fixed-base"
-        heights = [
-            r.trace.column("height_m") if r.has_column("height_m") else np.full(len(r), np.nan)
-            for r in self._recordings
-        ]
+        heights = [float_column(r.trace.table, "height_m") for r in self._recordings]
         self._height0 = np.concatenate(heights)[self._spans["start"]]
-        self._offsets = [
-            initial_states.OffsetFinder(r)
-            if initial_states.has_encoder_offsets(r.metadata)
-            else None
-            for r in self._recordings
-        ]
+        zeroed = initial_states.has_encoder_offsets(self._metadata)
+        self._offsets = [initial_states.OffsetFinder(r) for r in self._recordings if zeroed]
         self._base_rates: dict[tuple[float, ...], Array] = {}
 
     def run(self, hypotheses: Sequence[parameters.LegHypothesis]) -> Array:
         """Return the results, (hypotheses, windows, rows, ``RESULT``)."""
-        found = [
-            [np.zeros(2) if f is None else f.find(h) for f in self._offsets] for h in hypotheses
-        ]
-        offsets = np.array(found)[:, self._of_window]
+        offsets = np.zeros((len(hypotheses), len(self._of_window), 2))
+        if self._offsets:
+            found = np.array([[finder.find(h) for finder in self._offsets] for h in hypotheses])
+            offsets = found[:, self._of_window]
         table, drives = self._table(hypotheses), self._drives(hypotheses)
         state = self._start(hypotheses, offsets)
         shape = (*state.shape[:2], int(self._spans["length"].max()), replay.RESULT)
@@ -160,16 +142,11 @@ class _WindowGroup:
 
         compile_replay()
         pairs = state.shape[0] * state.shape[1]
-        if self._threads == 1 or pairs == 1:
-            work(0, pairs)
-        else:
-            parts = min(pairs, _PARTS * self._threads)
-            ends = np.linspace(0, pairs, parts + 1).astype(int)
-            with ThreadPoolExecutor(self._threads) as pool:
-                list(pool.map(work, ends[:-1], ends[1:]))
+        ends = np.linspace(0, pairs, min(pairs, _PARTS * self._threads) + 1).astype(int)
+        with ThreadPoolExecutor(self._threads) as pool:
+            list(pool.map(work, ends[:-1], ends[1:]))
         result[..., 0:2] += offsets[:, :, None]
-        gain, offset = (_drive_values(hypotheses, n) for n in ("sensor_gain", "torque_offset"))
-        result[..., 4:6] = gain[:, None, None] * result[..., 4:6] + offset[:, None, None]
+        result[..., 4:6] *= _drive_values(hypotheses, "sensor_gain")[:, None, None]
         if not self._moving:
             result[..., 6] = np.nan
         return result
@@ -197,10 +174,9 @@ class _WindowGroup:
         legs["friction_stiffness"] = np.where(creep > 0, soft, legs["friction_stiffness"])
         legs["friction_damping"][creep[:, 0] > 0] = 1 / self._timestep
         table = np.repeat(legs[:, None], len(self._recordings), axis=1)
-        fitted = _drive_values(hypotheses, "torque_limit")
         for n, recording in enumerate(self._recordings):
-            stated = recording.metadata.torque_limit or table["torque_limit"][:, n]
-            table["torque_limit"][:, n] = np.where(np.isnan(fitted), stated, fitted)
+            if recording.metadata.torque_limit is not None:
+                table["torque_limit"][:, n] = recording.metadata.torque_limit
             seen = recording.array("position")  # where a joint has been, nothing stops it
             table["stop_lower"][:, n] = np.fmin(table["stop_lower"][:, n], np.nanmin(seen, axis=0))
             table["stop_upper"][:, n] = np.fmax(table["stop_upper"][:, n], np.nanmax(seen, axis=0))
@@ -208,7 +184,7 @@ class _WindowGroup:
 
     def _drives(self, hypotheses: Sequence[parameters.LegHypothesis]) -> Records:
         drives = np.zeros(len(hypotheses), replay.DRIVE)
-        for name in ("delay", "velocity_window", "ramp"):
+        for name in ("delay", "ramp"):
             drives[name] = [getattr(h.drive, name) for h in hypotheses]
         if self._metadata.onboard == "torque":
             return drives
@@ -219,7 +195,7 @@ class _WindowGroup:
             if (unknown & np.isnan(drives["gains"][:, columns])).any():
                 raise RecordingError(
                     f"{self._recordings[0].name} does not say the {name} of its on-board PD; state"
-                    f" it in the sidecar, or fit 'drive.hip.{name}' and 'drive.knee.{name}'."
+                    f" it, or fit 'drive.hip.{name}' and 'drive.knee.{name}'."
                 )
         return drives
 
@@ -248,13 +224,16 @@ class _WindowGroup:
 
 
 def _recorded_rows(recording: Recording) -> Records:
-    rows = np.zeros(len(recording), replay.ROW)
+    rows, metadata = np.zeros(len(recording), replay.ROW), recording.metadata
     rows["time"] = recording.time
     rows["state"] = np.concatenate(initial_states.start_states(recording), axis=1)
     for name in ("position", "velocity", "torque"):
         rows[name] = np.nan_to_num(recording.array(f"{name}_command"))
     rows["slope"][:-1] = rows["velocity"][:-1]
-    rows["gains"] = np.concatenate([_recorded_gains(recording, n) for n in _GAINS], axis=1)
+    for column, name in ((0, "stiffness"), (2, "damping")):  # rows win over the metadata
+        found, stated = recording.array(name), getattr(metadata, name) or (np.nan, np.nan)
+        rows["gains"][:, column : column + 2] = np.where(np.isnan(found), stated, found)
+    rows["gains"][:, 4:] = metadata.integral or (0.0, 0.0)
     return rows
 
 
@@ -300,7 +279,7 @@ class WindowSimulator:
         kinds: dict[tuple[object, ...], list[int]] = {}
         for index, window in enumerate(windows):
             metadata = recordings[window.recording].metadata
-            kind = (metadata.rig, metadata.onboard, metadata.effective_gravity)
+            kind = (metadata.rig, metadata.onboard, metadata.effective_gravity, metadata.zeroed)
             kinds.setdefault(kind, []).append(index)
         self._groups = [
             (ids, _WindowGroup(recordings, [windows[i] for i in ids], timestep, threads))

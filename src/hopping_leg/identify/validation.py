@@ -11,7 +11,6 @@ from hopping_leg.identify.cost import measured
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import PAIRS, Pair
 from hopping_leg.identify.simulate import Window, WindowSimulator, cut
-from hopping_leg.robot.model import COARSE_TIMESTEP
 
 HORIZONS = (0.2, 0.5, 1.0)
 """How far to predict without looking at the recording again, s."""
@@ -22,30 +21,28 @@ _UNSCORED = 1.0  # beginning that does not count in closed loop, s, or a quarter
 class Validation:
     """Root mean square errors, (hip, knee), on exact samples only; NaN where nothing counts."""
 
-    closed_loop_position: Pair
+    closed_loop_position_rms_rad: Pair
     """Under the recording's own controller from its first row on, rad; recordings that command
     torques have none and do not count."""
-    closed_loop_torque: Pair
+    closed_loop_torque_rms_nm: Pair
     """Likewise, N m."""
-    open_loop_position: dict[float, Pair]
-    """By horizon in s: driven by the recorded torques alone, rad."""
+    open_loop_position_rms_rad: dict[str, Pair]
+    """By horizon in s, e.g. ``"0.2"``: driven by the recorded torques alone, rad."""
 
 
 def validate(
     recordings: Sequence[Recording],
     hypothesis: parameters.LegHypothesis,
-    timestep: float = COARSE_TIMESTEP,
     threads: int = 0,
 ) -> Validation:
     """Judge a hypothesis on recordings; one that is shorter than a horizon is left out there.
 
-    The timestep is in s. RecordingError says that a recording is too short to judge anything.
+    RecordingError says that a recording is too short to judge anything.
     """
     controlled = [r for r in recordings if r.metadata.onboard != "torque"]
     windows = cut(controlled, None, unscored=_unscored(recordings))
-    effort = (hypothesis, timestep, threads)
-    position, torque = _errors(controlled, windows, *effort, "position", "torque")
-    ahead = {h: open_loop(recordings, hypothesis, h, timestep, threads) for h in HORIZONS}
+    position, torque = _errors(controlled, windows, hypothesis, threads, "position", "torque")
+    ahead = {str(h): open_loop(recordings, hypothesis, h, threads) for h in HORIZONS}
     return Validation(position, torque, ahead)
 
 
@@ -53,7 +50,6 @@ def open_loop(
     recordings: Sequence[Recording],
     hypothesis: parameters.LegHypothesis,
     horizon: float,
-    timestep: float = COARSE_TIMESTEP,
     threads: int = 0,
 ) -> Pair:
     """Return the rms position error of predictions restarted every half horizon, rad.
@@ -68,20 +64,19 @@ def open_loop(
         and d.has("torque_command")
     ]
     windows = [w for w in cut(driven, horizon, stride=horizon / 2) if _starts_known(driven, w)]
-    return _errors(driven, windows, hypothesis, timestep, threads, "position")[0]
+    return _errors(driven, windows, hypothesis, threads, "position")[0]
 
 
 def _errors(
     recordings: Sequence[Recording],
     windows: Sequence[Window],
     hypothesis: parameters.LegHypothesis,
-    timestep: float,
     threads: int,
     *quantities: str,
 ) -> list[Pair]:
     if not windows:
         return [(np.nan, np.nan)] * len(quantities)
-    simulator = WindowSimulator(recordings, windows, timestep=timestep, threads=threads)
+    simulator = WindowSimulator(recordings, windows, threads=threads)
     simulated = simulator.run([hypothesis])
     return [rms(getattr(simulated, q)[0] - measured(simulator, q)) for q in quantities]
 
@@ -144,15 +139,10 @@ class Overlay:
     simulated: dict[str, Array]
     """By each hypothesis, (hypotheses, rows, 2)."""
 
-    def errors(self, quantity: str) -> Array:
-        """Return simulated minus measured, (hypotheses, rows, 2)."""
-        return self.simulated[quantity] - self.measured[quantity]
-
 
 def overlays(
     recordings: Sequence[Recording],
     hypotheses: Sequence[parameters.LegHypothesis],
-    timestep: float,
     threads: int = 0,
 ) -> list[Overlay]:
     """Simulate recordings, best those that no fit has seen, with hypotheses to compare."""
@@ -161,7 +151,7 @@ def overlays(
         restarted = recording.metadata.onboard == "torque"
         length, unscored = (RESTART, 0.0) if restarted else (None, skip)
         windows = cut([recording], length, unscored=unscored)
-        simulator = WindowSimulator([recording], windows, timestep=timestep, threads=threads)
+        simulator = WindowSimulator([recording], windows, threads=threads)
         simulated = simulator.run(hypotheses)
         known, found = {}, {}
         for name in ("position", "torque"):
