@@ -19,7 +19,7 @@ from torch import nn
 from hopping_leg import envs
 from hopping_leg.arrays import Array, Array32
 from hopping_leg.rl.distillation.dagger import Dagger, cosine
-from hopping_leg.rl.distillation.students import WindowStudent
+from hopping_leg.rl.distillation.students import StudentConfig, WindowStudent
 from hopping_leg.rl.onnx_export import Actor, DenseActor
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.sb3_env import TaskVecEnv
@@ -171,9 +171,11 @@ def learn_teacher(
 def refine(dagger: Dagger, recipe: Recipe, robot: Robot, seed: int, steps: int) -> Actor:
     """Go on from a distilled student by PPO; return the actor."""
     student = dagger.student
+    network = recipe.network
     assert isinstance(student, WindowStudent), "only dense students are refined"
+    assert isinstance(network, StudentConfig), "a distillation has a student"
     env = TaskVecEnv(_task(recipe, robot, seed), privileged=True)
-    parts = {"actor": env.task.observation.size, "hidden": list(recipe.value("hidden"))}
+    parts = {"actor": env.task.observation.size, "hidden": list(network.hidden)}
     model = _ppo(env, 1e-4, _LOG_STD[1], seed, _Policy, **parts)
     layers = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
     for own, given in zip(layers, student.layers, strict=True):

@@ -1,6 +1,7 @@
 """Variants differ from the recipe in one part, train as long, and are judged alike."""
 
 import json
+from operator import attrgetter
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ def tiny(monkeypatch):
     trained = []
 
     def noted(recipe, robot, seed):
-        trained.append((recipe.value("hidden"), recipe.schedule.steps, seed))
+        trained.append((recipe.network.hidden, recipe.schedule.steps, seed))
         return learner(recipe, seed, robot).network()
 
     for name in ("recipe", "small"):
@@ -47,14 +48,15 @@ def test_variants_differ_from_the_recipe_and_from_each_other_in_what_they_name()
     assert len({repr(variant) for variant in made}) == len(VARIANTS)
     assert made[0] == (FAST, distilled)
     for (recipe, _), (_, changes, _) in zip(made, VARIANTS.values(), strict=True):
-        differing = {n for n, _ in FAST.paths() if recipe.value(n) != FAST.value(n)}
+        paths = {n: attrgetter(path) for n, path in FAST.paths().items()}
+        differing = {n for n, value in paths.items() if value(recipe) != value(FAST)}
         assert differing == set(changes)
 
 
 def test_every_variant_trains_as_long_with_every_seed_and_once(tiny, tmp_path):
     study = Ablation(("small", "recipe"), (0, 1), 2 * ROLLOUT, ROBOT.name, tmp_path)
     found = study.measure()
-    own = TINY_FAST.value("hidden")
+    own = TINY_FAST.network.hidden
     assert tiny == [(hidden, 2 * ROLLOUT, seed) for hidden in ((64, 64), own) for seed in (0, 1)]
     assert [(r["variant"], r["seed"]) for r in found["rows"]] == [
         ("small", 0), ("small", 1), ("recipe", 0), ("recipe", 1),

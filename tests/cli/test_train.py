@@ -1,7 +1,6 @@
 import errno
 import json
 import os
-from pathlib import Path
 
 import pytest
 
@@ -9,8 +8,6 @@ from hopping_leg import cli
 from hopping_leg.errors import TraceError, UsageError
 from hopping_leg.locks import hold_folder
 from hopping_leg.rl import checkpoint, recipes
-from hopping_leg.rl.run_folder import RunFolder
-from hopping_leg.robot import load_robot
 from tests.rl.learners import TINY, try_briefly
 
 
@@ -74,21 +71,6 @@ def test_a_full_disk_leaves_no_half_checkpoint_and_names_the_next_command(
     assert not list((tmp_path / "checkpoints").iterdir())
     words = ["train", "--recipe", "tiny", "--out", tmp_path / "run"]
     refused(words, f"the same command with --resume goes on in {tmp_path / 'run'}.")
-
-
-def test_a_source_is_the_same_by_any_path(tiny, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "link").symlink_to(tmp_path)
-    recipe, robot = recipes.get_recipe("tiny"), load_robot(TINY.robot)
-
-    def folder(source):
-        return RunFolder(tmp_path / "run", recipe, robot, 0, None, source)
-
-    folder(Path("first")).write("config.json", folder(Path("first")).config)
-    folder(tmp_path / "first").check_same()
-    folder(tmp_path / "link" / ".." / tmp_path.name / "first").check_same()
-    with pytest.raises(UsageError, match="another source"):
-        folder(Path("second")).check_same()
 
 
 def test_a_folder_in_which_a_training_goes_on_is_refused(tiny, tmp_path, refused):

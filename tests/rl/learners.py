@@ -65,7 +65,7 @@ def policy_file(recipe, made):
     task = recipe.task
     about = task.observation, *task.command_bounds, task.action_torque
     card = Card("test", *about, ROBOT.name, ROBOT.digest, task.rate)
-    policy = Policy(build_policy(made.network(), made.observation, card), "memory", "test")
+    policy = Policy(build_policy(made.network(), made.task.observation, card), "memory", "test")
     policy.set_robot(ROBOT)
     return policy
 

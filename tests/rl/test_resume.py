@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import torch
 
-from hopping_leg.envs import Reward
 from hopping_leg.errors import UsageError
 from hopping_leg.rl import train as module
 from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
@@ -25,15 +24,20 @@ def test_a_killed_training_ends_with_the_same_policy(name, tmp_path, monkeypatch
         eval_every=192, checkpoint_seconds=0
     )
 
-    def kill(steps, _):
-        if steps >= 384:
-            torch.rand(100)
-            np.random.rand(100)  # noqa: NPY002
-            raise KilledError
+    class Killed(module.Trainer):
+        def _evaluate(self):
+            super()._evaluate()
+            if self.learner.num_timesteps >= 384:
+                torch.rand(100)
+                np.random.rand(100)  # noqa: NPY002
+                raise KilledError
 
     whole = module.train(recipe, ROBOT, 0, tmp_path / "whole", quiet=True)
+    trainer = module.Trainer
+    monkeypatch.setattr(module, "Trainer", Killed)
     with pytest.raises(KilledError):
-        module.train(recipe, ROBOT, 0, tmp_path / "cut", quiet=True, on_snapshot=kill)
+        module.train(recipe, ROBOT, 0, tmp_path / "cut", quiet=True)
+    monkeypatch.setattr(module, "Trainer", trainer)
     cut = module.train(recipe, ROBOT, 0, tmp_path / "cut", quiet=True, resume=True)
     assert cut.policy.read_bytes() == whole.policy.read_bytes()
     results = [json.loads((tmp_path / n / "result.json").read_text()) for n in ("whole", "cut")]
@@ -78,23 +82,3 @@ def test_a_run_is_never_overwritten_or_mixed(tmp_path, monkeypatch):
         with pytest.raises(UsageError, match=says):
             module.train(recipe, ROBOT, seed, out, resume=bool(resume), quiet=True)
     assert done.policy.read_bytes() == content
-
-
-def test_a_run_can_begin_where_another_stopped(tmp_path, monkeypatch):
-    try_briefly(monkeypatch)
-    first, second = tmp_path / "first", tmp_path / "second"
-    recipe = TINY.replace(steps=128, eval_every=64, learning_starts=32, checkpoint_seconds=0)
-    module.train(recipe, ROBOT, 0, first, quiet=True)
-    with pytest.raises(UsageError, match="no checkpoint"):
-        module.train(recipe, ROBOT, 0, second, source=tmp_path, quiet=True)
-    longer = recipe.replace(steps=256, learning_rate=1e-4)
-    shares, anneal = [], Reward.anneal
-    monkeypatch.setattr(
-        Reward, "anneal", lambda reward, share: (shares.append(share), anneal(reward, share))
-    )
-    trained = module.train(longer, ROBOT, 0, second, source=first, quiet=True)
-    assert trained.steps == 256
-    assert shares[-3:] == [0.25, 0.5, 0.75], "of the longer training, not of the one that is over"
-    history = json.loads((second / "result.json").read_text())["history"]
-    assert min(row["steps"] for row in history) >= 64
-    assert f"--source {first}" in (second / "model_card.md").read_text()

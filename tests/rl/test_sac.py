@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from hopping_leg.envs.observation import PaperObservation, sample_scaling
+from hopping_leg.envs.observation import Observation, sample_scaling
 from hopping_leg.sim.channel import Measurement
 from tests.rl.learners import ROBOT, TINY, learner, policy_file
 
@@ -30,7 +30,7 @@ def test_policy_file_gives_the_actors_torques(privileged):
     policy.reset(50)
     m = measurement(50)
     samples = np.concatenate([m.q, m.qd, m.command[..., None]], axis=-1)
-    seen = PaperObservation(sample_scaling(ROBOT, recipe.task)).view(samples)
+    seen = Observation(sample_scaling(ROBOT, recipe.task)).view(samples)
     truth = np.zeros((50, sac.observation_space.shape[0] - seen.shape[1]), np.float32)
     expected, _ = sac.predict(np.concatenate([seen, truth], axis=1), deterministic=True)
     action = policy.act(m) / recipe.task.action_torque

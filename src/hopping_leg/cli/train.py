@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from hopping_leg.cli import COMMAND
 from hopping_leg.cli.options import JsonFile, at_least, save_json, say
 from hopping_leg.errors import TraceError
 from hopping_leg.robot import load_robot
@@ -39,8 +40,6 @@ class Options:
     """The run's folder; default: runs/RECIPE-seedSEED."""
     resume: bool = False
     """Continue the run in the folder; start one if there is none."""
-    source: Path | None = None
-    """Begin from the newest checkpoint of this folder's run instead of from scratch."""
     set: tuple[str, ...] = ()
     """Numbers of the recipe to change, e.g. `--set learning_rate=3e-4 reward.jerk=0.2`."""
     randomise: Literal["none", "twins", "surprises"] | None = None
@@ -89,10 +88,10 @@ def run(args: Options) -> None:
             args.seed,
             out,
             resume=args.resume,
-            source=args.source,
             minutes=args.minutes,
             threads=args.threads,
             ray=args.ray,
+            command=COMMAND.get(),
         )
     except (KeyboardInterrupt, OSError, TraceError):
         print(f"Stopped; the same command with --resume goes on in {out}.", file=sys.stderr)

@@ -17,7 +17,7 @@ _NEAR_APEX = (-0.06, 0.03)
 class InitialStates:
     """Draws initial states: standing, or dropped in a random posture.
 
-    Legs that differ, each with a scale of the lengths of ``config``, (n,), have a ``geometry``.
+    ``geometry`` is the legs', ``scale`` that of the lengths of ``config`` for each, (n,).
 
     Raises:
         RobotError: The robot is no leg.
@@ -28,8 +28,8 @@ class InitialStates:
         self,
         robot: Robot,
         config: task_config.TaskConfig,
-        geometry: LegGeometry | None = None,
-        scale: Array | None = None,
+        geometry: kinematics.Geometry,
+        scale: Array,
     ) -> None:
         robot.require_leg()
         self.robot, self.config = robot, config
@@ -46,8 +46,9 @@ class InitialStates:
     def draw(self, rows: IntArray, command: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """Draw base heights, m, (k,), and joint angles, rad, (k, 2), for desired heights, m."""
         count, kind = len(command), self.config.reset_distribution
-        leg = self.robot if self._geometry is None else self._geometry.rows(rows)
-        scale = 1.0 if self._scale is None else self._scale[rows]
+        leg, scale = self._geometry, self._scale[rows]
+        if isinstance(leg, LegGeometry):
+            leg = leg.rows(rows)
         if kind == "standing":
             q = np.tile(self._standing, (count, 1))
             return kinematics.stance_height(leg, q), q
@@ -63,7 +64,7 @@ class InitialStates:
         return np.where(stands, standing, np.maximum(standing, apex)), q
 
     def _drop(
-        self, leg: kinematics.Geometry, scale: Array | float, count: int, rng: np.random.Generator
+        self, leg: kinematics.Geometry, scale: Array, count: int, rng: np.random.Generator
     ) -> tuple[Array, Array]:
         config = self.config
         length = scale * rng.uniform(*config.drop_length, count)

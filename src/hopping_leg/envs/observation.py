@@ -6,8 +6,8 @@ positions run from -1 at the lower to 1 at the upper soft limit, velocities are 
 scale, the command runs from -1 to 1 over its range.
 """
 
+import itertools
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -40,59 +40,48 @@ class Scaling(NamedTuple):
     """Inverse scales of the same, (k,)."""
 
 
-class Observation(ABC):
-    """Makes the observations of n legs."""
+class Observation:
+    """The observations of n legs: the paper's, straight from the channel's samples.
 
-    layout: str
-    """Name of the observation history that gives a trained policy the same inputs."""
-    scaling: Scaling
-    """Scaling of the history's joined inputs."""
-    order: IntArray
-    """Where each of these stands in an observation, (size,)."""
-    command_direction: Array
-    """What a command that is lower by a leg's length adds to an observation, (size,)."""
+    Attributes:
+        size: Entries of an observation.
+        scaling: Scaling of the joined inputs of the layout that gives a policy the same.
+        order: Where each of these stands in an observation, (size,).
+        command_direction: What a command that is lower by a leg's length adds to an observation,
+            (size,).
+    """
 
-    def __init__(self, layout: str, scaling: Scaling, order: IntArray | None = None) -> None:
-        self.layout, self.scaling, self.size = layout, scaling, len(scaling.offset)
-        self.order = np.arange(self.size) if order is None else order
+    def __init__(self, sample: Scaling) -> None:
+        place = np.arange(SIZE).reshape(SAMPLES, 5)
+        order = np.concatenate([place[:, 0:2].ravel(), place[:, 2:4].ravel(), place[:, 4]])
+        self._describe(Scaling(*(np.tile(values, SAMPLES)[order] for values in sample)), order)
+        self._sample = sample
+
+    def _describe(self, scaling: Scaling, order: IntArray) -> None:
+        self.scaling, self.order, self.size = scaling, order, len(order)
         self.command_direction = np.zeros(self.size)
 
-    @abstractmethod
     def view(self, samples: Array) -> Array32:
         """Return what is seen in this tick, (n, size)."""
+        seen = np.empty((len(samples), SIZE), np.float32)
+        _normalise(samples, self._sample.offset, self._sample.gain, seen)
+        return seen
 
-    def advance(self, samples: Array, channel: Channel, last_action: Array) -> None:  # noqa: B027
+    def advance(self, samples: Array, channel: Channel, last_action: Array) -> None:
         """Update with a tick's samples (q1, q2, qd1, qd2, command), newest first, (n, 3, 5).
 
         The last action is that of a tick ago, zero at the start of an episode, (n, 2).
         """
 
-    def restart(self, rows: IntArray, samples: Array, channel: Channel) -> None:  # noqa: B027
+    def restart(self, rows: IntArray, samples: Array, channel: Channel) -> None:
         """Forget the past of some legs, which begin anew within this tick."""
 
     def state(self) -> dict[str, Any]:
         """Return what is remembered from tick to tick."""
         return {}
 
-    def restore(self, state: dict[str, Any]) -> None:  # noqa: B027
+    def restore(self, state: dict[str, Any]) -> None:
         """Go on from a ``state``."""
-
-
-class PaperObservation(Observation):
-    """The paper's three samples; made straight from the channel's, because it is the fast path."""
-
-    def __init__(self, sample: Scaling) -> None:
-        place = np.arange(SIZE).reshape(SAMPLES, 5)
-        order = np.concatenate([place[:, 0:2].ravel(), place[:, 2:4].ravel(), place[:, 4]])
-        scaling = Scaling(*(np.tile(values, SAMPLES)[order] for values in sample))
-        super().__init__(observation_history.ThreeSamples.name, scaling, order)
-        self._sample = sample
-
-    def view(self, samples: Array) -> Array32:
-        """Return the normalised samples, (n, 15)."""
-        seen = np.empty((len(samples), SIZE), np.float32)
-        _normalise(samples, self._sample.offset, self._sample.gain, seen)
-        return seen
 
 
 @compiled
@@ -113,8 +102,15 @@ class HistoryObservation(Observation):
         torque: Array,
         count: int,
     ) -> None:
-        super().__init__(history.name, scaling)
-        self._history, self._torque, self._count = history, torque, count
+        self._describe(scaling, np.arange(len(scaling.offset)))
+        self._history, self._torque = history, torque
+        sizes = [math.prod(history.shapes[name]) for name in history.network_inputs]
+        ends = itertools.pairwise(itertools.accumulate(sizes, initial=0))
+        self._joined = np.empty((count, self.size))
+        self._parts = [
+            (name, self._joined[:, first:last].reshape(count, *history.shapes[name]))
+            for name, (first, last) in zip(history.network_inputs, ends, strict=True)
+        ]
         history.reset(count)
 
     def advance(self, samples: Array, channel: Channel, last_action: Array) -> None:
@@ -128,9 +124,11 @@ class HistoryObservation(Observation):
     def view(self, samples: Array) -> Array32:
         """Return the normalised inputs, (n, size)."""
         inputs = self._history.inputs()
-        parts = [inputs[name].reshape(self._count, -1) for name in self._history.network_inputs]
-        joined = np.concatenate(parts, axis=1, dtype=np.float64)
-        return ((joined - self.scaling.offset) * self.scaling.gain).astype(np.float32)
+        for name, part in self._parts:
+            part[:] = inputs[name]
+        seen = np.empty(self._joined.shape, np.float32)
+        np.subtract(self._joined, self.scaling.offset, out=self._joined)
+        return np.multiply(self._joined, self.scaling.gain, out=seen)
 
     def state(self) -> dict[str, Any]:
         """Return what the history remembers."""
@@ -158,7 +156,7 @@ def make_observation(
     """Return the observation that a task asks for, of legs of which something else is believed."""
     sample = sample_scaling(robot, config)
     if config.observation == observation_history.ThreeSamples.name:
-        return PaperObservation(sample)
+        return Observation(sample)
     history = observation_history.make_observation_history(config.observation, 1 / config.rate)
     history.set_robots(believed or [robot])
     sizes = {name: math.prod(history.shapes[name]) for name in history.network_inputs}

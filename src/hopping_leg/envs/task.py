@@ -2,6 +2,7 @@
 
 import copy
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, NoReturn
@@ -21,9 +22,11 @@ from hopping_leg.envs.observation import (
     sample_scaling,
 )
 from hopping_leg.robot import Robot
-from hopping_leg.robot.kinematics import LegGeometry
 from hopping_leg.sim import LegSimulator, Measurement, Plant, randomization
 from hopping_leg.sim.compiled import compiled
+
+_RECENT = 500
+"""Hops that count as the latest."""
 
 
 @dataclass(frozen=True)
@@ -115,31 +118,26 @@ class HoppingTask:
         self._end = np.empty(count, np.int64)
         self._switch = np.full(count, np.iinfo(np.int64).max)
         self.last_action, self._rises = np.zeros((count, 2)), np.zeros(count, np.bool_)
+        self._recent_errors: deque[float] = deque(maxlen=_RECENT)
         self.reset()
 
     def _take(self, robot: Robot, noise: np.random.Generator) -> None:
-        """Set what depends on whether legs differ."""
-        options, legs = self.options, self.task_legs
-        ranges = [leg.command_range for leg in legs] or [options.command_bounds] * self.count
-        self._ranges = np.array(ranges)
-        disturbed = np.array([leg.disturbed for leg in legs]) if legs else None
+        """Set what depends on what the legs are."""
+        options, count = self.options, self.count
+        legs = self.task_legs or (TaskLeg(robot, robot, options.command_bounds),) * count
+        self._ranges = np.array([leg.command_range for leg in legs])
+        disturbed = np.array([leg.disturbed for leg in legs])
         self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise, disturbed)
-        believed = [leg.believed for leg in legs] or [robot]
-        self.believed = tuple(believed) if legs else (robot,) * self.count
+        self.believed = tuple(leg.believed for leg in legs)
         """What is told of each leg."""
-        self.full_torque = np.tile(options.action_torque, (self.count, 1))
+        self.full_torque = np.array([options.action_torque] * count, np.float64)
         """Joint torques of full actions, N m, (n, 2)."""
         if options.observation == AnyLeg.name:
-            full = np.array([robot_numbers.full_torque(one) for one in believed])
-            self.full_torque = np.array(np.broadcast_to(full, (self.count, 2)))
-        self.observation = make_observation(robot, options, self.count, believed)
-        length = np.array([robot_numbers.leg_length(one) for one in believed])
-        geometry = self.legs.geometry
-        if isinstance(geometry, LegGeometry):
-            scale = length / robot_numbers.leg_length(robot)
-            self._initial_states = InitialStates(robot, options, geometry, scale)
-        else:
-            self._initial_states = InitialStates(robot, options)
+            self.full_torque = np.array(list(map(robot_numbers.full_torque, self.believed)))
+        self.observation = make_observation(robot, options, count, self.believed)
+        length = np.array([robot_numbers.leg_length(one) for one in self.believed])
+        scale = length / robot_numbers.leg_length(robot)
+        self._initial_states = InitialStates(robot, options, self.legs.geometry, scale)
 
     def _randomize(self, seed: int) -> None:
         """Let every leg go on with numbers of its own, the same ones for the same seed."""
@@ -149,6 +147,12 @@ class HoppingTask:
             variants = randomization.sample(self.robot, ranges, self.count, rng)
             self.legs.set_robots(variants)
             self._numbers = randomization.normalized(self.robot, variants, ranges)
+
+    @property
+    def mean_apex_error(self) -> float:
+        """Mean |apex - command| over the latest hops of all legs, m; NaN before the first."""
+        errors = self._recent_errors
+        return sum(map(abs, errors)) / len(errors) if errors else math.nan
 
     @property
     def privileged_size(self) -> int:
@@ -199,13 +203,9 @@ class HoppingTask:
         return self._next(reward, terms, command, apex_error, transition.apex_height)
 
     def _refuse(self, action: Array) -> NoReturn:
-        wrong = f"an array of shape {action.shape}"
-        if action.shape == (self.count, 2):
-            leg = int(np.argmin(np.isfinite(action).all(axis=1)))
-            wrong = f"{action[leg].tolist()} for leg {leg}"
         raise errors.UsageError(
             "Actions are torques of hip and knee over the full action's, finite numbers from -1 to"
-            f" 1 in the shape ({self.count}, 2), not {wrong}; check what computes them."
+            f" 1 in the shape ({self.count}, 2), not {action.tolist()!r:.60} in {action.shape}."
         )
 
     def __reduce__(self) -> NoReturn:
@@ -223,7 +223,9 @@ class HoppingTask:
         apex = hop_detection.at_apex(rose, self._rises, transition.foot_clearance)
         height = np.where(apex, np.maximum(height_before, transition.height), np.nan)
         transition.apex, transition.apex_height = apex, height
-        return height - transition.command
+        error: Array = height - transition.command
+        self._recent_errors.extend(error[apex].tolist())
+        return error
 
     def privileged(self) -> Array32:
         """Return true states, and where the legs' numbers lie in their ranges, (n, size)."""
@@ -246,6 +248,7 @@ class HoppingTask:
             "rises": self._rises.copy(),
             "rng": self._rng.bit_generator.state,
             "legs_seed": self._legs_seed,
+            "recent_errors": list(self._recent_errors),
             "reward": self.reward.state(),
             "observation": self.observation.state(),
         }
@@ -261,6 +264,7 @@ class HoppingTask:
         self._end[:] = state["end"]
         self._switch[:] = state["switch"]
         self.last_action, self._rises = np.array(state["last_action"]), np.array(state["rises"])
+        self._recent_errors = deque(state["recent_errors"], maxlen=_RECENT)
         self._rng.bit_generator.state = state["rng"]
         self.reward.restore(state["reward"])
         self.observation.restore(state["observation"])

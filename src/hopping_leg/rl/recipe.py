@@ -1,9 +1,8 @@
 """What a recipe is: everything that decides how a controller is trained, in parts."""
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from operator import attrgetter
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -78,37 +77,23 @@ class Recipe:
     the leg."""
     reward_terms: tuple[envs.RewardTerm, ...] = ()
     """Terms of one's own, beside the reward's."""
-    source: str | None = None
-    """``FILE.py:NAME`` of a recipe of one's own."""
 
     def replace(self, changes: Mapping[str, Any] | None = None, **more: Any) -> Self:  # noqa: ANN401
         """Return the recipe with options changed, by the names of ``paths`` or of whole parts."""
-        paths, changed = dict(self.paths()), self
+        paths, changed = self.paths(), self
         for name, value in {**(changes or {}), **more}.items():
             changed = io.replace_at(changed, paths.get(name, name), value)
         return changed
 
-    def paths(self) -> Iterator[tuple[str, str]]:
-        """Yield the name of every option and where it is.
+    def paths(self) -> dict[str, str]:
+        """Return where every option is, by its name.
 
         Those of task and reward are named with the part, as ``reward.jerk``; of the others only
         those of a part's part, as ``teacher.taper``.
         """
-        for part in ("task", "reward", *_PARTS):
-            config = getattr(self, part)
-            for option in dataclasses.fields(config) if config is not None else ():
-                inner = getattr(config, option.name)
-                if part not in _PARTS:
-                    yield f"{part}.{option.name}", f"{part}.{option.name}"
-                elif dataclasses.is_dataclass(inner):
-                    for f in dataclasses.fields(inner):
-                        yield f"{option.name}.{f.name}", f"{part}.{option.name}.{f.name}"
-                else:
-                    yield option.name, f"{part}.{option.name}"
-
-    def value(self, name: str) -> Any:  # noqa: ANN401
-        """Return an option by its name in ``paths``."""
-        return attrgetter(dict(self.paths())[name])(self)
+        parts = ("task", "reward", *_PARTS)
+        found = [path for part in parts for path in _paths(getattr(self, part), part)]
+        return {p.partition(".")[2] if p.startswith(_PARTS) else p: p for p in found}
 
     def make_learner(
         self, robot: Robot, seed: int, threads: int = 1, legs: Sequence[envs.TaskLeg] = ()
@@ -184,6 +169,13 @@ class Recipe:
         )
         heights = tuple(_round(c * ratio) for c in self.selection.eval_commands)
         return self.replace(task=fitted, eval_commands=heights)
+
+
+def _paths(config: Any, path: str) -> list[str]:  # noqa: ANN401
+    if not dataclasses.is_dataclass(config):
+        return [path]
+    names = [field.name for field in dataclasses.fields(config)]
+    return [p for name in names for p in _paths(getattr(config, name), f"{path}.{name}")]
 
 
 def _round(value: float, step: float = 0.005) -> float:

@@ -4,7 +4,6 @@ The state is taken at the entry of ``collect_rollouts``: after the gradient step
 exploration noise is drawn. Continuing from there is the same as never having stopped, bit by bit.
 """
 
-import copy
 import random
 import time
 from collections import deque
@@ -15,10 +14,9 @@ import numpy as np
 import torch
 from stable_baselines3 import SAC
 
-from hopping_leg.envs.observation import Observation
-from hopping_leg.rl.checkpoint import Tree, to_numpy, to_torch
+from hopping_leg.envs.task import HoppingTask
+from hopping_leg.rl.checkpoint import Tree, to_torch
 from hopping_leg.rl.onnx_export import Actor, DenseActor
-from hopping_leg.rl.recent_hops import RecentHops
 from hopping_leg.rl.sb3_env import TaskVecEnv
 
 _COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_current_progress_remaining")
@@ -35,14 +33,9 @@ class ResumableSAC(SAC):  # type: ignore[misc]
     _current_progress_remaining: float
 
     @property
-    def observation(self) -> Observation:
-        """What makes its observations."""
-        return self.env.task.observation
-
-    @property
-    def recent_hops(self) -> RecentHops:
-        """The latest hops."""
-        return self.env.recent_hops
+    def task(self) -> HoppingTask:
+        """The legs that learn."""
+        return self.env.task
 
     @property
     def share(self) -> float:
@@ -73,7 +66,7 @@ class ResumableSAC(SAC):  # type: ignore[misc]
         """Collect a rollout as usual, after the callback."""
         for name, mean in self.env.take_reward_terms().items():
             self.logger.record_mean(f"reward/{name}", mean)
-        self.env.task.reward.anneal(self.share)
+        self.task.reward.anneal(self.share)
         if self.on_boundary is not None:
             self.on_boundary()
         began = time.monotonic()
@@ -94,8 +87,8 @@ class ResumableSAC(SAC):  # type: ignore[misc]
     def state(self) -> Tree:
         """Return everything needed to continue exactly, its environment included."""
         tree = {
-            "policy": to_numpy(copy.deepcopy(self.policy.state_dict())),
-            "optimizers": [to_numpy(copy.deepcopy(o.state_dict())) for o in _optimizers(self)],
+            "policy": self.policy.state_dict(),
+            "optimizers": [o.state_dict() for o in _optimizers(self)],
             "counters": {name: getattr(self, name) for name in _COUNTERS},
             "env": self.env.state(),
             "last_observation": self._last_obs,
@@ -115,7 +108,7 @@ class ResumableSAC(SAC):  # type: ignore[misc]
         if "log_ent_coef" in state:
             self.log_ent_coef.data.copy_(torch.from_numpy(state["log_ent_coef"]))
         for optimizer, tree in zip(_optimizers(self), state["optimizers"], strict=True):
-            optimizer.load_state_dict(copy.deepcopy(to_torch(tree)))
+            optimizer.load_state_dict(to_torch(tree))
         for name, value in state["counters"].items():
             setattr(self, name, value)
         self._last_obs = state["last_observation"]

@@ -1,7 +1,6 @@
-"""The folder of one training: what it was asked for, checkpoints, snapshots, results."""
+"""The folder of one training: what it was asked for, checkpoints, results, the model card."""
 
 import json
-import shlex
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -10,14 +9,17 @@ from hopping_leg.controllers.registry import ROBOT_FILE
 from hopping_leg.errors import UsageError
 from hopping_leg.io import parse_json, versions, write_atomically, write_json
 from hopping_leg.locks import FOLDER_LOCK
-from hopping_leg.rl import checkpoint, recipes
+from hopping_leg.rl import checkpoint
 from hopping_leg.rl.recipe import Recipe
-from hopping_leg.robot import Robot, load_robot, robot_text, robot_tree, shipped_robots
+from hopping_leg.robot import TIMESTEP, Robot, robot_text, robot_tree, shipped_robots
 
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "onnxruntime", "stable-baselines3", "torch")
 
-_ASKED = ("recipe", "robot_digest", "seed", "minutes_budget", "source", "options")
+_ASKED = ("recipe", "robot_digest", "seed", "minutes_budget", "options")
 """What a run must have been asked for alike to go on."""
+
+MISSED = 0.02
+"""Median error beyond which a policy misses its command, m; the robustness suite's."""
 
 
 class RunFolder:
@@ -30,12 +32,11 @@ class RunFolder:
         robot: Robot,
         seed: int,
         minutes: float | None,
-        source: Path | None = None,
     ) -> None:
         self.path, self.checkpoints = path, path / "checkpoints"
         self.policy = path / "policy.onnx"
         """The selected policy, once the training is over."""
-        self._recipe, self._robot, self._source = recipe, robot, source
+        self._robot = robot
         config = {
             "recipe": recipe.name,
             "options": asdict(recipe),
@@ -43,64 +44,38 @@ class RunFolder:
             "robot_digest": robot.digest,
             "seed": seed,
             "minutes_budget": minutes,
-            "source": str(source) if source else None,
             "versions": {k: v for k, v in versions(*_LIBRARIES).items() if k != "python"},
         }
         self.config: dict[str, Any] = json.loads(json.dumps(config, default=_name))
         """What the run was asked for, as JSON values."""
 
-    @property
-    def command(self) -> str:
-        """The command that makes such a run."""
-        robot = self._robot.name
-        if robot not in shipped_robots() or load_robot(robot) != self._robot:
-            robot = str(self.path / ROBOT_FILE)
-        words = ["hop", "train", "--recipe", self._recipe.source or self._recipe.name]
-        words += ["--robot", robot, "--seed", str(self.config["seed"])]
-        if self._source is not None:
-            words += ["--source", str(self._source)]
-        if self.config["minutes_budget"] is not None:
-            words += ["--minutes", f"{self.config['minutes_budget']:g}"]
-        return shlex.join([*words, *recipes.words_of(self._recipe)])
-
-    def begin(self, *, resume: bool) -> checkpoint.Tree | None:
+    def begin(self, *, new: bool) -> checkpoint.Tree | None:
         """Prepare the folder; return the newest checkpoint if there is one to resume from.
 
         Raises:
-            UsageError: The folder holds a run and ``resume`` is off, another or finished run,
-                or checkpoints of an older version alone.
+            UsageError: The folder holds another or finished run, or checkpoints of an older
+                version alone.
         """
-        new = is_new(self.path, resume=resume)
-        if not new:
-            self.check_same()
-            if self.policy.exists():
-                raise UsageError(f"The run in {self.path} is finished; it made {self.policy}.")
-        found = checkpoint.list_checkpoints(self.checkpoints)
-        tree = checkpoint.read_checkpoint(found[-1]) if found else self._from_source()
         if new:
-            self.write("config.json", self.config)
+            write_json(self.path / "config.json", self.config)
             write_robot(self.path, self._robot)
-        return tree
-
-    def _from_source(self) -> checkpoint.Tree | None:
-        if self._source is None:
             return None
-        found = checkpoint.list_checkpoints(self._source / "checkpoints")
-        if not found:
-            raise UsageError(f"{self._source} holds no checkpoint to begin from.")
-        return {**checkpoint.read_checkpoint(found[-1]), "history": []}
+        self.check_same()
+        if self.policy.exists():
+            raise UsageError(f"The run in {self.path} is finished; it made {self.policy}.")
+        found = checkpoint.list_checkpoints(self.checkpoints)
+        return checkpoint.read_checkpoint(found[-1]) if found else None
 
-    def write(self, name: str, content: Any) -> None:  # noqa: ANN401
-        """Write a JSON file of the folder, whole or not at all."""
-        write_json(self.path / name, content)
+    def write_result(self, result: dict[str, Any]) -> None:
+        """Write ``result.json`` and the model card."""
+        write_json(self.path / "result.json", result)
+        write_atomically(self.path / "model_card.md", model_card(result).encode())
 
     def check_same(self) -> None:
         """Raise ``UsageError`` that names what else the run in the folder was asked for."""
         stored = _read_json(self.path / "config.json")
         for key in _ASKED:
             there, asked = stored.get(key), self.config[key]
-            if key == "source" and there and asked:
-                there, asked = (str(Path(str(source)).resolve()) for source in (there, asked))
             if there != asked:
                 raise UsageError(
                     f"The run in {self.path} has another {key.replace('_', ' ')}"
@@ -146,3 +121,82 @@ def _name(function: object) -> str:
 
 def _short(value: Any) -> str:  # noqa: ANN401
     return "other values" if isinstance(value, dict) else repr(value)
+
+
+def model_card(result: dict[str, Any]) -> str:
+    """Return the card of a training, as Markdown, from its result."""
+    selected, task, name = result["selected"], result["options"]["task"], result["robot"]
+    commands = task["command_range"] or (min(task["commands"]), max(task["commands"]))
+    versions = ", ".join(f"{name} {number}" for name, number in result["versions"].items())
+    robot = f"`{name}`" if name in shipped_robots() else f"{name}, `{ROBOT_FILE}` in this folder"
+    any_leg = result["options"]["legs"] == "any"
+    legs = "any leg of this kind;\nthe trials below are on" if any_leg else "robot"
+    steps, minutes, tried = selected["steps"], selected["minutes"], len(result["history"])
+    chosen = (
+        f"- Selection: the policy after {steps} steps ({minutes:.1f} min) of {tried} snapshots.\n"
+    )
+    return f"""# Policy `{result["recipe"]}`, seed {result["seed"]}
+
+One network from joint measurements to joint torques, for {legs} {robot}
+(parameters {result["robot_digest"]}), commands {commands[0]:g} to {commands[1]:g} m,
+{task["rate"]:g} Hz. Made by
+
+    {result["command"]}
+
+- Training: {result["steps"]} control steps, {result["minutes"]:.1f} min of wall-clock time, physics
+  step {1000 * task["timestep"]:g} ms.
+{_stages(result["stages"])}{chosen if tried > 1 else ""}- Versions: {versions}.
+
+Trials on the selection seeds {", ".join(map(str, selected["seeds"]))}, noise and delay on, physics
+step {1000 * TIMESTEP:g} ms, the first 2 s of each trial dropped. These seeds chose the policy;
+`hop evaluate policy.onnx` judges it on others, in this folder.
+
+| command m | median error mm | std mm | hops/s | flight % | skipped | body contact ticks\
+ | lowest base m |
+|---|---|---|---|---|---|---|---|
+{"".join(map(_row, selected["trials"]))}{missed_commands(selected["trials"])}"""
+
+
+def _stages(rows: list[dict[str, Any]]) -> str:
+    """Return lines on the stages of a distillation, if it was one."""
+    shown = "".join(
+        f"  - {row['name']}: {row['score']} {_mm(row['score_m'])} mm"
+        f" after {row['seconds']:.0f} s, {'passed' if row['passed'] else '**not passed**'}"
+        f" (at most {1000 * row['must_score_m']:g} mm)\n"
+        for row in rows
+    )
+    return f"- Stages:\n{shown}" if rows else ""
+
+
+def _row(trial: dict[str, Any]) -> str:
+    """Return the line of a command's trials in the table."""
+    cells = (
+        f"{trial['command_m']:g}",
+        _mm(trial["median_error_m"]),
+        _mm(trial["std_m"]),
+        f"{trial['hops_per_s']:.2f}",
+        f"{100 * trial['flight_fraction']:.0f}",
+        f"{trial['skipped_hops']} of {trial['hops'] + trial['skipped_hops']}",
+        str(trial["body_contact_ticks"]),
+        f"{trial['min_height_m']:.3f}",
+    )
+    return f"| {' | '.join(cells)} |\n"
+
+
+def missed_commands(trials: list[dict[str, Any]]) -> str:
+    """Return a paragraph on the commands that a policy misses in its own simulation, if any."""
+    missed = [
+        f"{command:g} m ({'no hops' if error is None else f'{1000 * error:+.0f} mm'})"
+        for command, error in ((t["command_m"], t["median_error_m"]) for t in trials)
+        if error is None or abs(error) > MISSED
+    ]
+    if not missed:
+        return ""
+    return f"""
+**Commands missed in its own simulation: {", ".join(missed)}.** Train longer or from another seed
+before this policy goes to any other leg.
+"""
+
+
+def _mm(metres: float | None) -> str:
+    return "no hops" if metres is None else f"{1000 * metres:.1f}"

@@ -9,7 +9,6 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from hopping_leg.arrays import Array, Array32, BoolArray
 from hopping_leg.envs.task import HoppingTask, Step
-from hopping_leg.rl.recent_hops import RecentHops
 
 
 class TaskVecEnv(VecEnv):  # type: ignore[misc]
@@ -26,7 +25,6 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
         self.render_mode = None
         super().__init__(task.count, space, gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32))
-        self.recent_hops = RecentHops()
         self._terms, self._steps = np.zeros(len(task.reward.names)), 0
         self._return = np.zeros(task.count)
         self._length = np.zeros(task.count, np.int64)
@@ -58,7 +56,6 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         self._steps += 1
         self._return += step.reward
         self._length += 1
-        self.recent_hops.add(step.apex_error)
         done = step.terminated | step.truncated
         infos = self._end_episodes(step, done) if done.any() else self._nothing
         return self._observation(step.observation), step.reward, done, infos
@@ -92,7 +89,6 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         """Return everything needed to go on exactly from here."""
         return {
             "task": self.task.state(),
-            "recent_hops": self.recent_hops.state(),
             "return": self._return.copy(),
             "length": self._length.copy(),
         }
@@ -100,7 +96,6 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a ``state``."""
         self.task.restore(state["task"])
-        self.recent_hops.restore(state["recent_hops"])
         self._return[:], self._length[:] = state["return"], state["length"]
 
     def close(self) -> None:

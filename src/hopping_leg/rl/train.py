@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -17,7 +17,6 @@ from hopping_leg.envs import TaskLeg
 from hopping_leg.rl import onnx_export, reach, run_folder
 from hopping_leg.rl.checkpoint import write_checkpoint
 from hopping_leg.rl.distillation.dagger import DaggerConfig
-from hopping_leg.rl.model_card import write_card
 from hopping_leg.rl.policy_evaluation import FINAL_SEEDS, Selection, calibrate, input_range
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot.parameters import Robot
@@ -25,9 +24,6 @@ from hopping_leg.terminal import Progress
 
 _RANGE_LEGS, _RANGE_STRIDE = 24, 5
 """Legs of any size whose hops tell a policy's range of inputs, and which of their heights do."""
-
-SHOWN_EVERY = 0.5
-"""Time between two updates of the progress bar, s."""
 
 
 @dataclass(frozen=True)
@@ -86,12 +82,11 @@ def train(
     out: Path,
     *,
     resume: bool = False,
-    source: Path | None = None,
     minutes: float | None = None,
     threads: int = 1,
     quiet: bool = False,
     ray: str | None = None,
-    on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None,
+    command: str = "hopping_leg.rl.train",
 ) -> Trained:
     """Train a controller, scaled to the robot's size; leave policy, card and history in ``out``.
 
@@ -104,14 +99,12 @@ def train(
         seed: Seed of weights, exploration, task, noise and delay.
         out: The run's folder.
         resume: Go on with the run in ``out``; without one, begin.
-        source: Folder of another run of this recipe and robot; its newest checkpoint is the start,
-            its steps and time count, its snapshots do not.
         minutes: Stop after so much wall-clock time, pauses excluded, or at the recipe's steps.
         threads: Threads of torch and physics; torch's is set for the whole process.
         quiet: Show no progress.
         ray: Address of a Ray cluster that finds out what the teacher reaches on legs of any size;
             without one, processes of this machine do, as many as ``threads``, at least two.
-        on_snapshot: Called with steps and score, m, of every snapshot; may raise to end it.
+        command: What to call what made the policy, in its model card.
 
     Raises:
         UsageError: ``out`` holds a run that cannot be continued so.
@@ -130,22 +123,21 @@ def train(
     title = f"{recipe.name} seed {seed}"
     with Progress(f"{title}, preparing", quiet=quiet) as progress:
         fitted = recipe.fit(robot)
-        folder = run_folder.RunFolder(out, fitted, robot, seed, minutes, source)
+        folder = run_folder.RunFolder(out, fitted, robot, seed, minutes)
         recipe, worst_score = reach.within_reach(fitted, robot)
-        run_folder.is_new(out, resume=resume)  # or refused, before a lock is put into it
+        new = run_folder.is_new(out, resume=resume)  # or refused, before a lock is put into it
         with locks.hold_folder(out, errors.UsageError):
-            tree = folder.begin(resume=resume)
+            tree = folder.begin(new=new)
             legs = reach.find_legs(
                 fitted, seed, out / "legs.json", max(threads, 2), ray,
                 lambda share: progress.show(title, share, about=", trying legs"),
             )  # fmt: skip
-            trainer = Trainer(recipe, robot, seed, folder, minutes, threads, began, legs)
+            trainer = Trainer(recipe, robot, folder, legs, progress, threads, began)
             trainer.end_stage(worst_score)
             trainer.learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
-            trainer.on_snapshot = on_snapshot
             if tree is not None:
                 trainer.restore(tree)
-            return trainer.run(progress)
+            return trainer.run(command)
 
 
 class Trainer:
@@ -155,16 +147,15 @@ class Trainer:
         self,
         recipe: Recipe,
         robot: Robot,
-        seed: int,
         folder: run_folder.RunFolder,
-        minutes: float | None,
+        legs: Sequence[TaskLeg],
+        progress: Progress,
         threads: int,
         began: float,
-        legs: Sequence[TaskLeg] = (),
     ) -> None:
-        self.recipe, self.robot, self.seed, self.folder = recipe, robot, seed, folder
-        self.legs = legs
-        self._seconds = float("inf") if minutes is None else 60 * minutes
+        self.recipe, self.robot, self.folder, self.legs = recipe, robot, folder, legs
+        seed, minutes = folder.config["seed"], folder.config["minutes_budget"]
+        self._seconds = math.inf if minutes is None else 60 * minutes
         self.learner = recipe.make_learner(robot, seed, threads, legs)
         self.learner.on_boundary = self._at_boundary
         if minutes is not None:
@@ -175,11 +166,8 @@ class Trainer:
         """How the stages of a distillation ended so far, as JSON values."""
         self.seconds: dict[str, float] = {"before the first rollout": time.monotonic() - began}
         """Time spent on each part since the run began or was resumed."""
-        self._earlier = 0.0
-        self._began, self._saved = began, time.monotonic()
-        self._shown, self._title = 0.0, f"{recipe.name} seed {seed}"
-        self._progress: Progress | None = None
-        self.on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None
+        self._earlier, self._began, self._saved = 0.0, began, time.monotonic()
+        self._progress, self._title = progress, f"{recipe.name} seed {seed}"
 
     @property
     def elapsed(self) -> float:
@@ -187,27 +175,26 @@ class Trainer:
         return self._earlier + time.monotonic() - self._began
 
     def restore(self, tree: dict[str, Any]) -> None:
-        """Go on from a checkpoint, of this run or of the shorter one that it begins with."""
+        """Go on from a checkpoint."""
         self.learner.restore(tree["learner"])
         self.selection.rows, self.stages = tree["history"], tree["stages"]
         self._earlier = tree["elapsed"]
         self._began = time.monotonic()
 
-    def run(self, progress: Progress) -> Trained:
+    def run(self, command: str) -> Trained:
         """Learn until steps or time are used up; write the selected policy."""
-        self._progress = progress
-        learner, recipe = self.learner, self.recipe
-        if self.elapsed < self._seconds and learner.num_timesteps < recipe.schedule.steps:
-            learner.train_until(recipe.schedule.steps, self.tick, recipe.schedule.log_every)
+        learner, schedule = self.learner, self.recipe.schedule
+        if self.tick() and learner.num_timesteps < schedule.steps:
+            learner.train_until(schedule.steps, self.tick, schedule.log_every)
         self._evaluate()
         learner.logger.close()
-        self._show(force=True)
-        progress.show(self._title, 1.0, about=", selecting and calibrating")
+        self._progress.show(self._title, 1.0, about=", selecting and calibrating")
         with self._timed("selection and calibration"):
             content, selected = self._finish()
         minutes, steps = self.elapsed / 60, int(learner.num_timesteps)
         result = {
-            "command": self.folder.command,
+            **self.folder.config,
+            "command": command,
             "minutes": minutes,
             "steps": steps,
             "selected": selected,
@@ -215,8 +202,7 @@ class Trainer:
             "stages": self.stages,
             "seconds": self.seconds | learner.seconds,
         }
-        self.folder.write("result.json", {**self.folder.config, **result})
-        write_card(self.folder.path)
+        self.folder.write_result(result)
         io.write_atomically(self.folder.policy, content)
         return Trained(self.folder.policy, minutes, steps)
 
@@ -247,16 +233,16 @@ class Trainer:
         self.seconds[name] = self.seconds.get(name, 0.0) + time.monotonic() - began
 
     def tick(self) -> bool:
-        """Show the progress; return whether there is time left."""
-        self._show()
+        """Return whether there is time left."""
         return self.elapsed < self._seconds
 
     def _at_boundary(self) -> None:
+        self._show()
         due = self.learner.num_timesteps >= self.selection.next_at
         if due and self.learner.share >= self.recipe.selection.eval_start:
             self._evaluate()
         if len(self.stages) == 1 and self.learner.share >= self._stages[1].until:
-            self.end_stage(self.learner.recent_hops.mean_error)
+            self.end_stage(self.learner.task.mean_apex_error)
         if time.monotonic() - self._saved >= self.recipe.schedule.checkpoint_seconds:
             self.checkpoint()
 
@@ -291,11 +277,11 @@ class Trainer:
             robot=robot.name,
             robot_digest=robot.digest,
             rate=recipe.task.rate,
-            seed=self.seed,
+            seed=self.folder.config["seed"],
             steps=int(self.learner.num_timesteps),
             versions=self.folder.config["versions"],
         )
-        return onnx_export.build_policy(self.learner.network(), self.learner.observation, card)
+        return onnx_export.build_policy(self.learner.network(), self.learner.task.observation, card)
 
     def _evaluate(self) -> None:
         steps = int(self.learner.num_timesteps)
@@ -309,19 +295,13 @@ class Trainer:
                 if trial[name] is not None:
                     logger.record(f"{at}/{name}", trial[name])
         logger.dump(steps)
-        self.on_snapshot(steps, row["score_m"])
 
-    def _show(self, *, force: bool = False) -> None:
-        now = time.monotonic()
-        if self._progress is None or (now - self._shown < SHOWN_EVERY and not force):
-            return
-        self._shown = now
-        steps, hops = int(self.learner.num_timesteps), self.learner.recent_hops
+    def _show(self) -> None:
+        steps, error = int(self.learner.num_timesteps), self.learner.task.mean_apex_error
         share = max(steps / self.recipe.schedule.steps, self.elapsed / self._seconds)
-        notes = [f"{hops.count} hops"]
-        if math.isfinite(hops.mean_error):
-            notes.append(f"apex error {1000 * hops.mean_error:.0f} mm")
-        notes.append(f"{steps / self.elapsed:.0f} steps/s")
+        notes = [f"{steps / self.elapsed:.0f} steps/s"]
+        if math.isfinite(error):
+            notes.append(f"apex error {1000 * error:.0f} mm")
         if self.selection.rows:
             best = min(float(row["score_m"]) for row in self.selection.rows)
             notes.append(f"best snapshot {1000 * best:.0f} mm")

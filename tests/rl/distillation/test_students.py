@@ -1,4 +1,4 @@
-"""Students: what a memory is, and that it can be learnt."""
+"""Students: what they are shown, what a memory is, and that it can be learnt."""
 
 from types import SimpleNamespace
 
@@ -7,8 +7,7 @@ import pytest
 import torch
 from torch.nn import functional
 
-from hopping_leg.rl.distillation.buffer import LabelledRollout, RolloutBuffer
-from hopping_leg.rl.distillation.students import StudentConfig
+from hopping_leg.rl.distillation.students import LabelledRollout, RolloutBuffer, StudentConfig
 
 LEGS, TICKS, SIZE, UNSEEN = 5, 8, 2, 3
 
@@ -94,3 +93,44 @@ def test_a_recurrent_student_learns_to_repeat_what_is_no_longer_seen(every):
         loss.backward()
         optimizer.step()
     assert loss.item() < 0.05
+
+
+def tagged(number, begun=()):
+    """Return a rollout whose observations and labels tell its number and the leg."""
+    seen = np.full((TICKS, LEGS, SIZE), number, np.float32)
+    seen[..., 1] = np.arange(LEGS)
+    starts = np.zeros((TICKS, LEGS), bool)
+    for place in begun:
+        starts[place] = True
+    memory = np.arange(LEGS, dtype=np.float32)[:, None] + 1
+    return LabelledRollout(seen, seen.copy(), seen[..., 1] + 1, seen[..., :1], starts, memory)
+
+
+def test_the_oldest_rollouts_make_room():
+    buffer, generator = RolloutBuffer(2, TICKS, LEGS, SIZE, 1, 1), torch.Generator()
+    for number in range(1, 6):
+        buffer.add(tagged(number))
+        kept = {float(n) for n in (number - 1, number) if n}
+        observations, labels, weights, hidden, _ = buffer.ticks(200, generator)
+        assert observations.shape == labels.shape == (200, 2)
+        assert set(observations[:, 0].tolist()) == kept
+        assert set(observations[:, 1].tolist()) == set(map(float, range(LEGS)))
+        assert torch.equal(observations, labels)
+        assert torch.equal(weights, observations[:, 1] + 1)
+        assert torch.equal(hidden, observations[:, :1])
+        sequences = [buffer.sequences(2 * TICKS, generator) for _ in range(20)]
+        assert {float(s.observations[0, 0, 0]) for s in sequences} == kept
+        assert all(s.observations.shape == (TICKS, 2, 2) for s in sequences)
+
+
+def test_a_sequence_counts_up_to_a_new_episode_with_its_own_legs_memory():
+    """An episode that begins with the sequence remembers nothing."""
+    buffer = RolloutBuffer(2, TICKS, LEGS, SIZE, 1, 1)
+    buffer.add(tagged(0, begun=[(0, 1), (2, 1)]))
+    drawn = buffer.sequences(TICKS * LEGS, torch.Generator())
+    for leg, weights, memory in zip(
+        drawn.observations[0, :, 1], drawn.weights.T, drawn.memory, strict=True
+    ):
+        new = leg == 1
+        assert weights.tolist() == [2, 2, *[0] * (TICKS - 2)] if new else [leg + 1] * TICKS
+        assert memory == (0 if new else leg + 1)

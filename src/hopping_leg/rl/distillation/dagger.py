@@ -24,10 +24,13 @@ from hopping_leg.controllers import robot_numbers
 from hopping_leg.controllers.mpc import HopShape, Planning, TrueStateMpc
 from hopping_leg.envs.hidden_state import HiddenState
 from hopping_leg.envs.task import HoppingTask, Step
-from hopping_leg.rl.checkpoint import Tree, to_numpy, to_torch
-from hopping_leg.rl.distillation.buffer import LabelledRollout, RolloutBuffer
-from hopping_leg.rl.distillation.students import Student, StudentConfig
-from hopping_leg.rl.recent_hops import RecentHops
+from hopping_leg.rl.checkpoint import Tree, to_torch
+from hopping_leg.rl.distillation.students import (
+    LabelledRollout,
+    RolloutBuffer,
+    Student,
+    StudentConfig,
+)
 from hopping_leg.robot import GRAVITY
 
 _PUSHED, _PUSHES = 0.15, 0.5
@@ -105,14 +108,12 @@ class Dagger:
         self.task, self.config = task, config
         self._hidden = HiddenState(task.legs, task.believed) if config.hidden_weight else None
         unseen = self._hidden.size if self._hidden else 0
-        self.observation = task.observation
         self.student = network.make(task.observation, unseen)
         self.optimizer = torch.optim.Adam(self.student.parameters(), lr=config.learning_rate)
         self.teacher = config.make_teacher(task)
         self.teacher.watch(task.legs)
         self.logger = Logger(None, [])
         self.num_timesteps = 0
-        self.recent_hops = RecentHops()
         self.seconds = {"rollouts": 0.0, "gradient steps": 0.0}
         """Time spent on each; they run side by side."""
         self._actor: Student = copy.deepcopy(self.student)
@@ -165,7 +166,7 @@ class Dagger:
                 self.num_timesteps += self.config.n_steps * self.task.count
                 rollouts += 1
                 if rollouts % log_interval == 0:
-                    self.logger.record("rollout/apex_error_m", self.recent_hops.mean_error)
+                    self.logger.record("rollout/apex_error_m", self.task.mean_apex_error)
                     self.logger.dump(self.num_timesteps)
 
     @property
@@ -195,7 +196,6 @@ class Dagger:
             action, self._memory = self._actor(torch.from_numpy(seen), self._memory * fresh)
         taught = self._mixing.random(len(begun)) < self.mixing
         step = self._act(np.where(taught[:, None], label, action.numpy()))
-        self.recent_hops.add(step.apex_error)
         if self._hidden:
             self._hidden.update(step.apex_error, step.terminated | step.truncated)
         self._seen, self._begun = step.observation, step.terminated | step.truncated
@@ -277,8 +277,8 @@ class Dagger:
     def state(self) -> Tree:
         """Return everything needed to continue exactly, environments included."""
         return {
-            "student": to_numpy(copy.deepcopy(self.student.state_dict())),
-            "optimizer": to_numpy(copy.deepcopy(self.optimizer.state_dict())),
+            "student": self.student.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
             "buffer": self._buffer.state(),
             "task": self.task.state(),
             "teacher": self.teacher.state(),
@@ -290,14 +290,13 @@ class Dagger:
             "draws": self._draws.get_state().numpy(),
             "mixing": self._mixing.bit_generator.state,
             "steps": self.num_timesteps,
-            "recent_hops": self.recent_hops.state(),
             "hidden": self._hidden.state() if self._hidden else {},
         }
 
     def restore(self, state: Tree) -> None:
         """Go on from a ``state``."""
         self.student.load_state_dict(to_torch(state["student"]))
-        self.optimizer.load_state_dict(copy.deepcopy(to_torch(state["optimizer"])))
+        self.optimizer.load_state_dict(to_torch(state["optimizer"]))
         self._buffer.restore(state["buffer"])
         self._seen = self.task.restore(state["task"])
         self.teacher.restore(state["teacher"])
@@ -307,6 +306,5 @@ class Dagger:
         self._draws.set_state(torch.from_numpy(state["draws"]))
         self._mixing.bit_generator.state = state["mixing"]
         self.num_timesteps = state["steps"]
-        self.recent_hops.restore(state["recent_hops"])
         if self._hidden:
             self._hidden.restore(state["hidden"])

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from operator import attrgetter
 from typing import Any, Literal, get_args, get_type_hints
 
 import msgspec
@@ -50,7 +51,7 @@ def get_recipe(name: str) -> Recipe:
     recipe = found() if callable(found) else found
     if not isinstance(recipe, Recipe):
         raise UsageError(f"'{name}' is no recipe; name a Recipe, or a function that returns one.")
-    return recipe.replace(source=name)
+    return recipe
 
 
 def change(recipe: Recipe, changes: Sequence[str]) -> Recipe:
@@ -82,37 +83,10 @@ def randomise(recipe: Recipe, ranges: Randomise) -> Recipe:
 
 def settings_of(recipe: Recipe) -> dict[str, int | float | str]:
     """Return by name the options of a recipe that ``--set`` changes."""
-    found = {name: recipe.value(name) for name, _ in recipe.paths()}
+    found = {name: attrgetter(path)(recipe) for name, path in recipe.paths().items()}
     return {
         name: value
         for name, value in found.items()
         if name in _TEXTS
         or (isinstance(value, int | float) and (not name.startswith("task.") or name in _OF_TASK))
     }
-
-
-def words_of(recipe: Recipe) -> list[str]:
-    """Return the words of ``hop train`` beside ``--recipe`` that make a recipe.
-
-    A recipe that is neither shipped nor a file's has none.
-    """
-    if recipe.source is None and recipe.name not in RECIPES:
-        return []
-    usual, words = get_recipe(recipe.source or recipe.name), list[str]()
-    drawn = recipe.task.randomised
-    if drawn != usual.task.randomised:  # ranges of one's own have no word
-        words += [w for name, r in _RANGES.items() if r == drawn for w in ("--randomise", name)]
-    if recipe.task.observation != usual.task.observation:
-        words += ["--observation", recipe.task.observation]
-    if recipe.heights:
-        words += ["--heights", *map(str, recipe.heights)]
-    changes = changes_of(usual, recipe)
-    return [*words, "--set", *changes] if changes else words
-
-
-def changes_of(usual: Recipe, recipe: Recipe) -> list[str]:
-    """Return ``name=value`` of the options that ``--set`` has to change to make a recipe."""
-    numbers = settings_of(usual)
-    return [
-        f"{name}={recipe.value(name)}" for name in numbers if recipe.value(name) != numbers[name]
-    ]
