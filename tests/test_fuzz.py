@@ -188,7 +188,7 @@ def _gains():
 def _faults():
     from hopping_leg.emulator.faults import load_faults
 
-    script = b'[[fault]]\nkind = "late_reply"\nsince = "flight"\nat = 2.0\nphase = "stance"\n'
+    script = b'[[fault]]\nkind = "late_reply"\nsince = "flight"\nat = 2.0\n'
     script += b'drive = "knee"\nvalue = 0.012\ncount = 3\n\n[[fault]]\nkind = "configuration"\n'
     script += b'name = "servo.max_current_A"\nvalue = 20.0\nduration = 0.1\n'
     return Kind({"faults.toml": script}, "faults.toml", load_faults)

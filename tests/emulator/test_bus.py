@@ -116,10 +116,3 @@ def test_nonsense_is_refused_and_forgotten(line):
     (refusal,) = protocol.feed(line + b"\n")
     assert refusal.startswith(b"ERR")
     assert len(protocol.feed(SEND + b"\n")) == 2
-
-
-def test_endless_noise_takes_no_memory():
-    protocol = LineProtocol()
-    for _ in range(50):
-        protocol.feed(b"x" * 100)
-    assert len(protocol._lines._rest) <= 512

@@ -44,7 +44,7 @@ class Emulate:
     robot: str = DEFAULT_ROBOT
     """A shipped robot or a .toml file; its [reality] stands behind the wire, too."""
     start_pose: tuple[str, ...] = ("stand",)
-    """stand, crouch, stretch, zero (straight down), or angles of hip and knee, rad."""
+    """stand, zero (straight down), or angles of hip and knee, rad."""
     faults: Path | None = None
     """TOML script of faults and their times."""
     link: Path | None = None

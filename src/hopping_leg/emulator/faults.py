@@ -5,8 +5,7 @@ A new kind is a subclass of ``FaultKind`` here, and a family in the study of fau
 [[fault]]
 kind = "late_reply"
 since = "flight"    # the first time that the foot leaves the ground
-at = 2.0            # seconds after that ...
-phase = "stance"    # ... at the next moment of this phase
+at = 2.0            # seconds after that
 drive = "knee"
 value = 0.012       # what it means depends on the kind: here seconds
 duration = 0.1
@@ -36,9 +35,6 @@ KINDS: "dict[str, type[FaultKind]]" = {}
 _SINCE = ("start", "powered", "flight")
 """From when on ``at`` counts: the emulator's start, both drives powered, first lift-off."""
 
-_PHASES = ("any", "stance", "flight", "rising", "falling", "touchdown", "apex")
-"""Moments of a hop cycle."""
-
 _DRIVES = (*JOINTS, "both")
 Registers = dict[int, float]
 """What a drive says, by register."""
@@ -58,8 +54,6 @@ class Fault:
     since: str = "powered"
     at: float = 0.0
     """Seconds after ``since``."""
-    phase: str = "any"
-    """Moment of the hop cycle that is waited for then."""
     drive: str = "both"
     value: float | None = None
     """In the unit of the kind; none takes the kind's default."""
@@ -71,7 +65,7 @@ class Fault:
     """Setting that is wrong, for ``configuration``."""
 
     def __post_init__(self) -> None:
-        valid = {"kind": KINDS, "since": _SINCE, "phase": _PHASES, "drive": _DRIVES}
+        valid = {"kind": KINDS, "since": _SINCE, "drive": _DRIVES}
         for name, choices in valid.items():
             if getattr(self, name) not in choices:
                 raise UsageError(unknown_name(f"fault {name}", str(getattr(self, name)), choices))

@@ -182,7 +182,6 @@ class FaultInjector:
         self._running: list[FaultKind] = []
         self.log: list[tuple[float, Fault]] = []
         self.powered = self.flown = math.inf
-        self._contact, self._rate = True, 0.0
         for fault in faults:
             if KINDS[fault.kind].at_start:
                 self._begin(fault)
@@ -193,10 +192,11 @@ class FaultInjector:
 
     def step(self) -> None:
         """Begin, update and end what is due before a step of physics."""
-        phases, time = self._phases(), self._robot.time
+        self._watch()
+        time = self._robot.time
         since = {"start": 0.0, "powered": self.powered, "flight": self.flown}
         for fault in list(self._pending):
-            if time >= since[fault.since] + fault.at and fault.phase in phases:
+            if time >= since[fault.since] + fault.at:
                 self._pending.remove(fault)
                 self._running.append(self._begin(fault))
         for running in list(self._running):
@@ -216,24 +216,14 @@ class FaultInjector:
         for _ in range(delivery.copies):
             self._robot.reply_queue.put(delivery.due, QueuedReply(frame, flip=delivery.flip))
 
-    def _phases(self) -> set[str]:
-        """Return the phases of this moment; record power and the first lift-off."""
+    def _watch(self) -> None:
+        """Record when both drives are powered, and then the first lift-off."""
         robot = self._robot
         if math.isinf(self.powered) and all(drive.active for drive in robot.drives):
             self.powered = robot.time
-        contact, rate = robot.leg.foot_clearance <= 0, robot.leg.height_rate
-        phases = {"any", "stance" if contact else "flight"}
-        if not contact:
-            phases.add("rising" if rate > 0 else "falling")
-            if self._rate > 0 >= rate:
-                phases.add("apex")
-            airborne = robot.leg.foot_clearance > _AIRBORNE
-            if airborne and math.isinf(self.flown) and math.isfinite(self.powered):
-                self.flown = robot.time
-        elif not self._contact:
-            phases.add("touchdown")
-        self._contact, self._rate = contact, rate
-        return phases
+        unflown = math.isinf(self.flown) and math.isfinite(self.powered)
+        if unflown and robot.leg.foot_clearance > _AIRBORNE:
+            self.flown = robot.time
 
     def _begin(self, fault: Fault) -> FaultKind:
         running = KINDS[fault.kind](fault, self._robot, self._rng)

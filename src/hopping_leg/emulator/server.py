@@ -20,10 +20,10 @@ from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, kinematics, load_robot
 
-_LENGTHS = {"stand": 0.69, "crouch": 0.5, "stretch": 0.93}
-"""Named poses: leg length over the straight leg's, foot below the hip."""
+_STANDING = 0.69
+"""Length of a leg that stands over the straight leg's, foot below the hip."""
 
-POSES = (*_LENGTHS, "zero")
+POSES = ("stand", "zero")
 """Named poses; ``zero`` is the leg straight down, where the joints' angles are zero."""
 
 
@@ -84,8 +84,8 @@ def posture(robot: Robot, pose: str) -> Array:
     """
     if pose == "zero":
         return np.zeros(2)
-    if pose in _LENGTHS:
-        length = _LENGTHS[pose] * (robot.thigh.length + robot.shank.length)
+    if pose == "stand":
+        length = _STANDING * (robot.thigh.length + robot.shank.length)
         return kinematics.joint_angles(robot, np.array([length, 0.0]))
     try:
         hip, knee = (float(part) for part in pose.split(","))
@@ -137,30 +137,23 @@ class Server:
         self.robot.advance(now)
 
 
-def serve(robot: EmulatedRobot, port: LinePort, *, ready: bool) -> bool:
+def serve(robot: EmulatedRobot, port: LinePort, *, ready: bool) -> None:
     """Hand over what is due between host and robot, and pull or push the plug.
 
-    ``ready`` tells that the host may have sent something; returns whether the host has something.
+    ``ready`` tells that the host may have sent something.
     """
-    answered = False
     if ready and port.plugged:
         for frame in port.receive():
             robot.receive(frame)
-            answered |= _deliver(robot, port)  # the host reads it while the next one is answered
-    answered |= _deliver(robot, port)
-    if robot.plugged == port.plugged:
-        return answered
-    if robot.plugged:
+            _deliver(robot, port)  # the host reads it while the next one is answered
+    _deliver(robot, port)
+    if robot.plugged and not port.plugged:
         port.plug_in()
-    else:
+    elif port.plugged and not robot.plugged:
         port.unplug()
-    return True
 
 
-def _deliver(robot: EmulatedRobot, port: LinePort) -> bool:
-    """Send what is due; return whether there was anything."""
-    items = robot.reply_queue.take(robot.time)
-    for item in items:
+def _deliver(robot: EmulatedRobot, port: LinePort) -> None:
+    for item in robot.reply_queue.take(robot.time):
         if port.plugged:
             port.send(item)
-    return bool(items)

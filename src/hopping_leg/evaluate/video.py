@@ -4,6 +4,7 @@ OpenGL drivers crash, hang or are missing; none of that may take an evaluation d
 OpenGL's back end when it is imported: EGL there, unless MUJOCO_GL names another.
 """
 
+import functools
 import io
 import json
 import os
@@ -59,11 +60,9 @@ def render_videos(robot: Robot, runs: Sequence[trials.Run]) -> dict[str, Video]:
             poses = sample(run.trace, _first_apex(run.trace), CLIP_SECONDS)
             own = clips.setdefault(run.controller, [])
             own.append(Clip(run.controller, colours[run.controller], poses))
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        videos = pool.map(
-            lambda own: render_clips(robot, own, 1000 * SLOWDOWN / FRAME_RATE), clips.values()
-        )
-        return dict(zip(clips, videos, strict=True))
+    with ThreadPoolExecutor() as pool:
+        shown = functools.partial(render_clips, robot, milliseconds=1000 * SLOWDOWN / FRAME_RATE)
+        return dict(zip(clips, pool.map(shown, clips.values()), strict=True))
 
 
 def _first_apex(trace: Trace) -> float:
