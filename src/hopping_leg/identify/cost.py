@@ -54,10 +54,6 @@ class RobustLoss:
         """Return weighted residuals and what is beside them, whose squares add up to the cost."""
         return np.concatenate([self.weights(residuals) * residuals, self.rest(residuals)])
 
-    def cost(self, residuals: Array) -> float:
-        """Return the cost of one hypothesis's residuals, (size,)."""
-        return float(np.sum(self.levelled(residuals) ** 2))
-
     def _squares(self, residuals: Array) -> Array:
         """Return groups' mean squared residuals in units of the level, (groups,)."""
         total = np.bincount(self.groups, np.square(residuals), len(self.sizes))
@@ -139,8 +135,8 @@ class Objective:
     @property
     def jumping(self) -> IntArray | None:
         """Groups of the residuals, (size,), if feet touch down, which makes them jump."""
-        rigs = {self.recordings[w.recording].metadata.rig for w in self.windows}
-        return self.groups if rigs != {"fixed-base"} else None
+        clamped = all(r.metadata.rig == "fixed-base" for r in self.recordings)
+        return None if clamped else self.groups
 
     def residuals(self, vectors: Array) -> Array:
         """Return residuals of search vectors (n, k) in units of the scales, (n, size)."""
@@ -160,7 +156,7 @@ class Objective:
 
     def __call__(self, vectors: Array) -> Array:
         """Return the costs of search vectors (n, k), by default the paper's J, (n,)."""
-        return np.array([self.loss.cost(r) for r in self.residuals(vectors)])
+        return np.array([np.sum(self.loss.levelled(r) ** 2) for r in self.residuals(vectors)])
 
     def __getstate__(self) -> dict[str, Any]:
         cached = ("simulator", "_scored", "groups", "loss")

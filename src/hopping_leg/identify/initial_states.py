@@ -17,7 +17,6 @@ two numbers of each recording, found by Gauss-Newton steps from its first second
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.errors import RecordingError
 from hopping_leg.identify import parameters, recording_format
 from hopping_leg.identify.recording import Recording
 from hopping_leg.robot import GRAVITY, Robot, dynamics, kinematics
@@ -75,13 +74,8 @@ def full_states(recording: Recording) -> tuple[Array, Array]:
 
     Measured where the row has them, else the estimate, else interpolated between measured rows;
     a velocity that was never measured is the position's slope. For initial states only.
-
-    Raises:
-        RecordingError: A joint has no measured position at all.
     """
     position = _filled(recording, "position")
-    if np.isnan(position).any():
-        raise RecordingError(f"{recording.name} lacks a joint's positions; record both.")
     velocity = _filled(recording, "velocity")
     slope = np.gradient(position, recording.time, axis=0)
     return position, np.where(np.isnan(velocity), slope, velocity)

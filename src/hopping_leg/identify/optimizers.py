@@ -124,7 +124,7 @@ def least_squares(
     residuals: Evaluate,
     parameters: ParameterSet,
     loss: RobustLoss,
-    options: SearchOptions | None = None,
+    options: SearchOptions = SearchOptions(),
     *,
     groups: IntArray | None = None,
     report: Progress = lambda share, cost: None,
@@ -134,7 +134,6 @@ def least_squares(
     The loss weighs residuals that no parameters explain, at the levels of the moment, which makes
     the cost's own slope exact; ``groups`` are those of ``jacobian``.
     """
-    options = options or SearchOptions()
     low, high = parameters.bounds
     margin = np.minimum(_MARGIN, 0.25 * (high - low))
     vector = np.clip(0.0, low + margin, high - margin)
@@ -176,7 +175,7 @@ def least_squares(
 def cma_es(
     values: Evaluate,
     parameters: ParameterSet,
-    options: SearchOptions | None = None,
+    options: SearchOptions = SearchOptions(),
     *,
     seed: int,
     shares: Sequence[Evaluate] = (),
@@ -189,7 +188,6 @@ def cma_es(
     turns, the distribution's mean wanders about where all of them agree; its averages and the
     best are judged by everything, and the best one counts.
     """
-    options = options or SearchOptions()
     low, high = parameters.bounds
     first = np.clip(0.0, low, high)
     bounds = [low.tolist(), high.tolist()]

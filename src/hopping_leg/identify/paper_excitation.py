@@ -33,9 +33,6 @@ class Stroke:
     The foot's distance from the hip is r = A cos(2 pi t / T1) + epsilon with
     epsilon = L1 + L2 - A - margin; its direction is theta = -(pi/2) cos(2 pi t / T2), or straight
     down without T2. Only whole periods are played, then the foot waits, so that strokes join.
-
-    Raises:
-        UsageError: A number is not positive, or the margin negative.
     """
 
     amplitude: float

@@ -191,9 +191,6 @@ def choose(
     """Return a set of parameters with sensible bounds and scales.
 
     ``bounds`` differ from the widest ones; ``start`` has values that differ from the base's.
-
-    Raises:
-        UsageError: A name does not exist, or bounds exclude the start.
     """
     units = parameter_units()
     parameters = []

@@ -172,9 +172,6 @@ def hold_out(
 
     Every fourth of equal stretches is held out, counted from a random one; a short recording gives
     its last quarter. No stretch to fit is shorter than a window, s.
-
-    Raises:
-        RecordingError: A recording is too short to be split.
     """
     fit: list[Recording] = []
     held: list[Recording] = []

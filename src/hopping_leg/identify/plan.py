@@ -90,10 +90,6 @@ def make_plan(
     """Decide how to identify a robot from recordings, on whatever rigs, as far as it is not said.
 
     Bounds are those that differ from the widest ones; ``two-pass`` is the paper's search.
-
-    Raises:
-        UsageError: A parameter or search does not exist, or bounds exclude a start or are of a
-            parameter that is not fitted.
     """
     search = search or "least-squares"
     if search not in SEARCHES:

@@ -50,9 +50,6 @@ def cut(
 
     Without a duration each recording is one window, as in the paper. The stride, s, is from one
     window's start to the next; without it there is no gap and no overlap.
-
-    Raises:
-        RecordingError: A recording is shorter than one window.
     """
     windows: list[Window] = []
     for index, recording in enumerate(recordings):
@@ -195,7 +192,7 @@ class _WindowGroup:
             if (unknown & np.isnan(drives["gains"][:, columns])).any():
                 raise RecordingError(
                     f"{self._recordings[0].name} does not say the {name} of its on-board PD; state"
-                    f" it, or fit 'drive.hip.{name}' and 'drive.knee.{name}'."
+                    " it, or fit that of drive.hip and drive.knee."
                 )
         return drives
 
@@ -258,9 +255,6 @@ class WindowSimulator:
     the number of threads, nor on what else is simulated beside a hypothesis.
 
     The physics step, s, is the training's own by default; 0 threads are one per core.
-
-    Raises:
-        UsageError: There is no window, or the physics step is longer than a recording's period.
     """
 
     def __init__(
@@ -271,8 +265,6 @@ class WindowSimulator:
         timestep: float = COARSE_TIMESTEP,
         threads: int = 0,
     ) -> None:
-        if not windows:
-            raise UsageError("There is nothing to simulate; give at least one window.")
         self.recordings, self.windows = tuple(recordings), tuple(windows)
         self.timestep, self.threads = timestep, threads
         self.rows = max(w.length for w in windows)
@@ -287,10 +279,7 @@ class WindowSimulator:
         ]
 
     def run(self, hypotheses: Sequence[parameters.LegHypothesis]) -> SimulatedWindows:
-        """Simulate every window with every hypothesis.
-
-        RecordingError says that a needed gain is open, RobotError that a robot is impossible.
-        """
+        """Simulate every window with every hypothesis."""
         shape = (len(hypotheses), len(self.windows), self.rows, replay.RESULT)
         whole = np.full(shape, np.nan)
         for ids, group in self._groups:
