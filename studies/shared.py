@@ -163,6 +163,18 @@ def do_all(jobs: Iterable[tuple[Any, ...]], at_once: int = 1) -> list[Row]:
         return workers.map(once, jobs)
 
 
+def show_rows(rows: Iterable[Row], *names: str) -> None:
+    """Print columns of rows by their names."""
+    columns = [name.replace("_", " ") for name in names]
+    show_table(columns, ([_shown(row[name]) for name in names] for row in rows))
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return "–" if value is None else str(value)
+
+
 def show_numbers(title: str, numbers: Row) -> None:
     """Print the numbers of a result, those of its parts under dotted names."""
     show_table(("number", "value"), ((k, f"{v:.4g}") for k, v in _numbers(numbers)), title)

@@ -8,22 +8,22 @@ ROOT = Path(__file__).parents[1]
 
 CEILINGS = {
     "src/hopping_leg/*.py": (12, 1210),
-    "src/hopping_leg/cli/**/*.py": (16, 1970),
+    "src/hopping_leg/cli/**/*.py": (16, 1930),
     "src/hopping_leg/controllers/**/*.py": (20, 2820),
     "src/hopping_leg/deploy/**/*.py": (20, 3300),
     "src/hopping_leg/emulator/**/*.py": (15, 2080),
     "src/hopping_leg/envs/**/*.py": (10, 1560),
     "src/hopping_leg/evaluate/**/*.py": (13, 2460),
     "src/hopping_leg/formats/**/*.py": (1, 220),
-    "src/hopping_leg/identify/**/*.py": (20, 4490),
+    "src/hopping_leg/identify/**/*.py": (20, 4070),
     "src/hopping_leg/rl/**/*.py": (19, 2560),
     "src/hopping_leg/robot/**/*.py": (14, 2100),
     "src/hopping_leg/sim/**/*.py": (12, 2410),
     "src/hopping_leg/viewer/**/*.py": (6, 1140),
-    "src/**/*.py": (178, 28270),
-    "tests/**/*.py": (137, 15260),
-    "studies/**/*.py": (79, 8110),
-    "docs/**/*.md": (22, 2500),
+    "src/**/*.py": (178, 27810),
+    "tests/**/*.py": (137, 14970),
+    "studies/**/*.py": (79, 8050),
+    "docs/**/*.md": (22, 2490),
     "docs/live/*.js": (13, 1480),
 }
 """Files and lines at most. Who raises one says what users gain by it."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from hopping_leg.cli.options import JsonFile, RobotFile, at_least, mm, show_table
+from hopping_leg.cli.options import JsonFile, RobotFile, at_least
 from hopping_leg.controllers.policy import Card
 from hopping_leg.envs.observation import make_observation
 from hopping_leg.errors import UsageError, unknown_name
@@ -24,7 +24,7 @@ from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
 from studies.ablations import ppo
-from studies.shared import Row, once
+from studies.shared import Row, once, show_rows
 from studies.time_to_accuracy.run import JUDGING_SEEDS, judge
 
 Train = Callable[[Recipe, Robot, int], Actor]
@@ -119,14 +119,7 @@ class Ablation:
                 found = once(file, asked, judged, recipe, robot, seed, train)
                 rows.append({"variant": name, "meaning": meaning, "seed": seed, **found})
         lengths = ("mean_abs_median_error_m", "worst_abs_median_error_m", "mean_std_m")
-        show_table(
-            ("variant", "seed", "error, mm", "worst, mm", "std, mm", "skipped"),
-            (
-                (row["variant"], row["seed"], *(mm(row[key]) for key in lengths),
-                 row["skipped_hops"])
-                for row in rows
-            ),
-        )  # fmt: skip
+        show_rows(rows, "variant", "seed", *lengths, "skipped_hops")
         return {
             "robot": self.robot,
             "steps": self.steps,

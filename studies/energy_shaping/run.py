@@ -8,7 +8,7 @@ import polars as pl
 from rich.progress import track
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.cli.options import JsonFile, RobotFile, at_least, mm, show_table
+from hopping_leg.cli.options import JsonFile, RobotFile, at_least
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.energy_shaping import paper_energy_shaping, tuned_energy_shaping
 from hopping_leg.controllers.energy_shaping.controller import EnergyShaping, LiteralEnergyShaping
@@ -19,7 +19,7 @@ from hopping_leg.io import plain
 from hopping_leg.robot import DEFAULT_ROBOT, TIMESTEP, Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, NoiseAndDelay, Simulator
 from hopping_leg.trace import Trace
-from studies.shared import Row
+from studies.shared import Row, show_rows
 
 COMMANDS = (0.25, 0.30, 0.35)
 """The paper's heights, m."""
@@ -172,14 +172,8 @@ class Baseline:
             single += rows
             if case.name in ("tuned", "paper"):
                 estimators += _estimators(case, traces)
-        show_table(
-            ("case", "median error, mm", "std, mm", "hops/s", "skipped", "body contacts"),
-            (
-                (r["case"], mm(r["mean_abs_median_error_m"]), mm(r["mean_std_m"]),
-                 f"{r['hop_rate_hz']:.2f}", r["skipped_hops"], r["body_contacts"])
-                for r in overall
-            ),
-        )  # fmt: skip
+        faults = ("skipped_hops", "body_contacts")
+        show_rows(overall, "case", "mean_abs_median_error_m", "mean_std_m", "hop_rate_hz", *faults)
         return {
             "robot": robot.name,
             "seed": self.seed,

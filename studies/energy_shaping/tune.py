@@ -18,7 +18,7 @@ import numpy as np
 from hopping_leg import hop_detection
 from hopping_leg.arrays import Array
 from hopping_leg.cli import COMMAND
-from hopping_leg.cli.options import JsonFile, RobotFile, say, show_table
+from hopping_leg.cli.options import JsonFile, RobotFile, say
 from hopping_leg.controllers import Rollout, RolloutConfig, rollout
 from hopping_leg.controllers.energy_shaping.controller import EnergyShaping
 from hopping_leg.controllers.energy_shaping.gains import (
@@ -29,7 +29,7 @@ from hopping_leg.controllers.energy_shaping.gains import (
 )
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import DEFAULT_ROBOT, load_robot
-from studies.shared import Row, main, once
+from studies.shared import Row, main, once, show_rows
 
 SETTLED = 2.0  # hops before this do not count, s
 _RATE = 1.5  # fewer hops per second than this cost
@@ -122,17 +122,8 @@ class Tune:
     def measure(self) -> Row:
         """Search, print what came out, write the gains; return scores and gains."""
         tuned = self.find()
-        show_table(
-            ("command, m", "median before", "after", "std before, mm", "after"),
-            [
-                (
-                    f"{before['command']:.2f}",
-                    *(f"{score['median']:.4f}" for score in (before, after)),
-                    *(f"{1e3 * score['std']:.1f}" for score in (before, after)),
-                )
-                for before, after in zip(tuned["before"], tuned["after"], strict=True)
-            ],
-        )
+        for row in ("before", "after"):
+            show_rows(tuned[row], "command", "median", "std", "rate", "flight")
         say(f"Gains: {self.gains}")
         return tuned
 

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from hopping_leg.cli.options import Heights, JsonFile, at_least, mm, show_table
+from hopping_leg.cli.options import Heights, JsonFile, at_least
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller, robot_of
 from hopping_leg.evaluate.metrics import measure, pooled_apexes
@@ -22,7 +22,7 @@ from hopping_leg.sim import Simulator
 from hopping_leg.sim.mujoco_simulator import MujocoSimulator
 from hopping_leg.workers import ProcessWorkers
 from studies.engines.pybullet import PyBulletSimulator
-from studies.shared import Row
+from studies.shared import Row, show_rows
 
 Engine = Literal["MuJoCo", "PyBullet"]
 
@@ -60,14 +60,7 @@ class Engines:
         with ProcessWorkers(self.workers) as pool:
             parts = pool.map(hop, [(self, *place) for place in places])
         rows = [row for part in parts for row in part]
-        show_table(
-            ("engine", "controller", "command, m", "median error, mm", "std, mm", "hops"),
-            (
-                (r["engine"], r["controller"], f"{r['command_m']:.2f}", mm(r["median_error_m"]),
-                 mm(r["std_m"]), r["hops"])
-                for r in rows
-            ),
-        )  # fmt: skip
+        show_rows(rows, "engine", "controller", "command_m", "median_error_m", "std_m", "hops")
         return {
             "rows": rows,
             "seeds": self.seeds,

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from rich.progress import track
 
-from hopping_leg.cli.options import JsonFile, at_least, mm, say, show_table
+from hopping_leg.cli.options import JsonFile, at_least, say
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.evaluate.metrics import measure
 from hopping_leg.robot import Robot, load_robot
-from studies.shared import Row
+from studies.shared import Row, show_rows
 
 TOLERANCE = 0.5e-3
 """By how much halving the step may move a median or a standard deviation, m."""
@@ -57,14 +57,8 @@ class PhysicsStep:
             about = {"controller": name, "robot": robot.name}
             converge.append({**about, "timestep_s": converged(own)})
             rows += own
-        show_table(
-            ("controller", "robot", "step, ms", "command, m", "error, mm", "std", "hops"),
-            (
-                (r["controller"], r["robot"], f"{r['timestep_s'] * 1e3:.3f}",
-                 f"{r['command_m']:.2f}", mm(r["median_error_m"]), mm(r["std_m"]), r["hops"])
-                for r in rows
-            ),
-        )  # fmt: skip
+        where = ("controller", "robot", "timestep_s", "command_m")
+        show_rows(rows, *where, "median_error_m", "std_m", "hops")
         result = {
             "tolerance_m": TOLERANCE,
             "converged_timestep_s": converged(rows),

@@ -16,13 +16,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hopping_leg.arrays import Array
-from hopping_leg.cli.options import show_table
 from hopping_leg.errors import UsageError
 from hopping_leg.figures import COLOURS, WIDTH, styled, to_svg
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import GRAVITY, Robot, load_robot
 from studies.real_hops.recorded import RIGS, Hop, load_hops
 from studies.real_hops.simulated import Simulated, simulate
+from studies.shared import show_rows
 
 MEASURED_GAIN = {"boom": 0.91, "rail": 1.0}
 """Measured torque over what ``simulate`` takes for the motors'."""
@@ -185,14 +185,7 @@ class RealHops:
             raise UsageError(f"Name the folder of recordings with --recordings, or in {_VARIABLE}.")
         result, shown = compare(Path(folder), print)
         columns = ("apex_mean_m", "apex_rms_m", "push_mean_s", "flight_mean_s")
-        show_table(
-            ("rig", "robot", *columns),
-            [(r["rig"], r["robot"], *(_shown(r[c]) for c in columns)) for r in result["rows"]],
-        )
+        show_rows(result["rows"], "rig", "robot", *columns)
         if self.figure is not None:
             write_atomically(self.figure, to_svg(figure(shown)))
         return result
-
-
-def _shown(value: float | None) -> str:
-    return "-" if value is None else f"{1e3 * value:.0f} e-3"

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from hopping_leg.cli.options import mm, say, show_table
-from studies.shared import Row
+from hopping_leg.cli.options import say
+from studies.shared import Row, show_rows
 from studies.sim_to_real.chain import Chain, Experiment
 from studies.sim_to_real.tables import tabulate
 from studies.sim_to_real.zero_shot import ZeroShot
@@ -26,33 +26,12 @@ class Transfer(Experiment):
             "identification": identification,
             "trainings": trainings,
         }
-        show_transfer(result)
+        errors = ("median_abs_error_m", "median_abs_error_low_m", "median_abs_error_high_m")
+        show_rows(result["rows"], "method", "command_m", *errors, "hops", "skipped_hops")
+        show_rows(result["methods"], "method", *errors, "ordered", "policies")
+        show_rows(result["comparison"], "method", "over", "ratio", "ratio_low", "ratio_high")
+        say(*(f"Note: {note}" for note in result["notes"]))
         return result
-
-
-def show_transfer(result: Row) -> None:
-    """Print the tables of sim-to-real trials."""
-    show_table(
-        ("trained on", "command, m", "|error|, mm", "from", "to", "error, mm", "hops", "skipped"),
-        (
-            (r["method"], f"{r['command_m']:.2f}",
-             *(mm(r[f"median_abs_error{end}_m"]) for end in ("", "_low", "_high")),
-             mm(r["median_error_m"]),
-             r["hops"], r["skipped_hops"])
-            for r in result["rows"]
-        ),
-    )  # fmt: skip
-    for row in result["methods"]:
-        say(
-            f"{row['method']}: {mm(row['median_abs_error_m'])} mm over all commands,"
-            f" {row['ordered']} of {row['policies']} policies in order"
-        )
-    for row in result["comparison"]:
-        say(
-            f"{row['method']} errs {row['ratio']:.1f} times as much as {row['over']}"
-            f" ({row['ratio_low']:.1f} to {row['ratio_high']:.1f})"
-        )
-    say(*(f"Note: {note}" for note in result["notes"]))
 
 
 Options = Transfer | ZeroShot

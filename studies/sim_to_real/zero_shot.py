@@ -9,7 +9,7 @@ import numpy as np
 
 from hopping_leg import io
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.cli.options import Heights, JsonFile, at_least, mm, say, show_table
+from hopping_leg.cli.options import Heights, JsonFile, at_least, say
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.controllers.command_schedule import command_range
 from hopping_leg.controllers.registry import ENERGY_SHAPING, MPC_TRUE_STATE, load_controller
@@ -22,7 +22,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import runner, statistics, trials
 from hopping_leg.hop_detection import find_hops, measure_hops
 from hopping_leg.robot import JOINTS, Robot, load_robot, parent_robot
-from studies.shared import Row, do_all
+from studies.shared import Row, do_all, show_rows
 from studies.sim_to_real.twins import LEAST_TWINS, disturbance_of, drawn_twin, fingerprint
 
 COMMANDS = (0.22, 0.24, 0.26, 0.28, 0.30, 0.32, 0.34, 0.36, 0.38, 0.40)
@@ -204,16 +204,10 @@ class ZeroShot:
         for row in pairs:
             row["reached"] = _place(row) in reached
         summary, every = summarize(pairs, names), len(sources) * len(self.commands)
-        show_table(
-            ("controller", "within 5 mm, %", "within 10 mm, %", "closer than energy shaping, %",
-             "median, mm", "std, mm", "skipped", "body contacts", "would be stopped, %"),
-            (
-                (r["controller"], _percent(r["within_5mm"]), _percent(r["within_10mm"]),
-                 _percent(r["closer_than_energy_shaping"]), mm(r["median_abs_error_m"]),
-                 mm(r["median_std_m"]), r["skipped_hops"], r["body_contacts"],
-                 _percent(r["would_be_stopped"]))
-                for r in summary
-            ),
+        show_rows(
+            summary, "controller", "within_5mm", "within_10mm", "closer_than_energy_shaping",
+            "median_abs_error_m", "median_std_m", "skipped_hops", "body_contacts",
+            "would_be_stopped",
         )  # fmt: skip
         say(f"{len(reached)} of {every} pairs of leg and command are within reach of {names[0]}.")
         return {
@@ -247,7 +241,3 @@ class ZeroShot:
                 f" --out {self.folder}`."
             )
         return files
-
-
-def _percent(share: float | None) -> str:
-    return "–" if share is None else f"{100 * share:.1f}"

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from hopping_leg.cli.options import JsonFile, mm, show_table
+from hopping_leg.cli.options import JsonFile
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.evaluate.runner import software_versions
 from hopping_leg.figures import controller_colours, panels, styled, to_svg
@@ -24,7 +24,7 @@ from hopping_leg.rl.recipes import RECIPES
 from hopping_leg.rl.run_folder import read_result
 from hopping_leg.rl.train import train
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
-from studies.shared import Row, once
+from studies.shared import Row, once, show_rows
 from studies.time_to_accuracy import sb3
 
 JUDGING_SEEDS = (1000, 1001)
@@ -68,14 +68,7 @@ class TimeToAccuracy:
                 spent += [{"recipe": recipe, "seed": seed, **found["spent"]}]
         summary = summarise(rows)
         lengths = ("mean_error_m", "worst_seed_mean_error_m", "mean_std_m")
-        show_table(
-            ("recipe", "seconds", "error, mm", "worst seed", "std, mm", "skipped"),
-            (
-                (row["recipe"], f"{row['seconds']:.0f}", *(mm(row[key]) for key in lengths),
-                 row["skipped_hops"])
-                for row in summary
-            ),
-        )  # fmt: skip
+        show_rows(summary, "recipe", "seconds", *lengths, "skipped_hops")
         if self.figure is not None:
             write_atomically(self.figure, to_svg(draw(rows)))
         return {

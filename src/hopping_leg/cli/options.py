@@ -42,11 +42,6 @@ def save_json(path: Path | None, value: object) -> None:
         io.write_json(path, value)
 
 
-def mm(metres: float | None) -> str:
-    """Return a length in mm as a table shows it."""
-    return "no hops" if metres is None else f"{metres * 1e3:.2f}"
-
-
 def say(*lines: object) -> None:
     """Print lines as they are, unwrapped and without markup."""
     for line in lines:
