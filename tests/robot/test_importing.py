@@ -197,6 +197,13 @@ def test_missing_numbers_are_named_with_the_option_that_gives_them(tmp_path):
         made(tmp_path / "leg.urdf", EXAMPLE, ())
 
 
+def test_a_urdfs_mesh_without_inertial_weighs_nothing(tmp_path):
+    mesh = '<collision><geometry><mesh filename="a.stl"/></geometry></collision>'
+    with_mesh = EXAMPLE.replace('<link name="stand"/>', f'<link name="stand">{mesh}</link>')
+    robots = [imported(tmp_path / "leg.urdf", text) for text in (EXAMPLE, with_mesh)]
+    assert robots[0] == robots[1]
+
+
 def test_joints_that_are_not_the_legs_are_held_and_named(tmp_path):
     path = tmp_path / "leg.urdf"
     path.write_text(LEG.replace('name="foot_tip" type="fixed"', 'name="ankle" type="continuous"'))

@@ -23,7 +23,6 @@ from hopping_leg.robot.model_mismatch import (
     DriveMismatch,
     GroundMismatch,
     Latency,
-    SensorMismatch,
 )
 from hopping_leg.robot.parameters import JOINTS, Joint, Link, Robot
 from hopping_leg.robot.robot_checks import check_physics, numbers
@@ -59,7 +58,6 @@ __all__ = [
     "Link",
     "MotorLimit",
     "Robot",
-    "SensorMismatch",
     "SoftLimits",
     "braking_times",
     "build_model",

@@ -52,16 +52,19 @@ class Description:
             raise RobotError(f"{path} is a template; expand it first: xacro {path} > leg.urdf.")
         self.origin = str(path)
         try:
+            root = Xml.parse(path).getroot()
             self._velocities = {
                 joint.get("name", ""): float(limit.attrib["velocity"])
-                for joint in Xml.parse(path).iterfind("joint")
+                for joint in root.iterfind("joint")
                 for limit in joint.iterfind("limit[@velocity]")
             }
             spec = mujoco.MjSpec.from_file(str(path))
             self.name = spec.modelname.strip() or "leg"
             self.loops = len(spec.equalities)
             """Constraints that close a loop, which are left out."""
-            self._leave_out(spec)
+            if root.tag == "mujoco":
+                self._refuse_heavy_meshes(spec)
+            _leave_out(spec)
             with warnings.catch_warnings(action="ignore"):  # of what is deprecated
                 self.model = spec.compile()
         except (ValueError, LookupError, Xml.ParseError, mujoco.FatalError) as error:
@@ -74,28 +77,14 @@ class Description:
         self.up = -self.model.opt.gravity / strength
         """Against gravity, unit vector, (3,)."""
 
-    def _leave_out(self, spec: mujoco.MjSpec) -> None:
-        for part in (*spec.geoms, *spec.sites):
-            part.material = ""
-        for geom in list(spec.geoms):
-            if geom.type in _OF_FILES or geom.meshname:
-                body, weighs = geom.parent, geom.mass > 0 or (geom.mass != 0 and geom.density > 0)
-                if weighs and not body.explicitinertial and body.name != "world":
-                    raise RobotError(
-                        f"{self.origin}: body '{body.name}' weighs what its mesh '{geom.meshname}'"
-                        " weighs, and meshes are not read; give the body an <inertial>."
-                    )
-                spec.delete(geom)
-        for actuator in list(spec.actuators):
-            if actuator.trntype != mujoco.mjtTrn.mjTRN_JOINT:
-                spec.delete(actuator)
-        for part in [part for kind in _UNREAD for part in getattr(spec, kind)]:
-            spec.delete(part)
-        for parts in (spec.bodies, spec.joints):
-            for number, part in enumerate(parts):
-                part.name = part.name or f"unnamed {number}"
-        spec.compiler.fusestatic = spec.compiler.discardvisual = False
-        spec.compiler.boundmass = spec.compiler.boundinertia = _NOTHING
+    def _refuse_heavy_meshes(self, spec: mujoco.MjSpec) -> None:
+        for geom in filter(_needs_file, spec.geoms):
+            body, weighs = geom.parent, geom.mass > 0 or (geom.mass != 0 and geom.density > 0)
+            if weighs and not body.explicitinertial and body.name != "world":
+                raise RobotError(
+                    f"{self.origin}: body '{body.name}' weighs what its mesh '{geom.meshname}'"
+                    " weighs, and meshes are not read; give the body an <inertial>."
+                )
 
     def joint(self, number: int) -> str:
         """Return a joint's name."""
@@ -166,3 +155,22 @@ class Description:
                     at = data.geom_xpos[i]
                     points += [Point(name, at + side * half, float(radius)) for side in sides]
         return points
+
+
+def _needs_file(geom: mujoco.MjsGeom) -> bool:
+    return geom.type in _OF_FILES or bool(geom.meshname)
+
+
+def _leave_out(spec: mujoco.MjSpec) -> None:
+    """Leave out what needs other files and what makes no leg; name what has no name."""
+    for part in (*spec.geoms, *spec.sites):
+        part.material = ""
+    unread = [*filter(_needs_file, spec.geoms)]
+    unread += [a for a in spec.actuators if a.trntype != mujoco.mjtTrn.mjTRN_JOINT]
+    for part in [*unread, *(part for kind in _UNREAD for part in getattr(spec, kind))]:
+        spec.delete(part)
+    for parts in (spec.bodies, spec.joints):
+        for number, part in enumerate(parts):
+            part.name = part.name or f"unnamed {number}"
+    spec.compiler.fusestatic = spec.compiler.discardvisual = False
+    spec.compiler.boundmass = spec.compiler.boundinertia = _NOTHING

@@ -18,6 +18,7 @@ DEFAULT_ROBOT = "legv2-identified"
 
 _SHIPPED = resources.files("hopping_leg.robot") / "robots"
 
+_LARGEST = 1e12  # magnitude of any number, whatever its unit
 _log = logging.getLogger(__name__)
 _told: set[str] = set()
 
@@ -26,9 +27,6 @@ def shipped_robots() -> list[str]:
     """Return the names of the robots that come with the package."""
     names = (file.name for file in _SHIPPED.iterdir())
     return sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml"))
-
-
-_LARGEST = 1e12  # magnitude of any number, whatever its unit
 
 
 def load_robot(name_or_path: str | Path) -> Robot:
@@ -68,8 +66,7 @@ def parent_robot(name_or_path: str | Path) -> str | None:
     Raises:
         RobotError: The file is missing or not TOML.
     """
-    origin = str(name_or_path)
-    return _parent(_read(origin), origin)[0] or None
+    return _parent(_read(str(name_or_path)), str(name_or_path))[0] or None
 
 
 def load_tree(name_or_path: str | Path) -> Tree:
@@ -78,8 +75,7 @@ def load_tree(name_or_path: str | Path) -> Tree:
     Raises:
         RobotError: The file, or one that it extends, is missing or not TOML.
     """
-    origin = str(name_or_path)
-    return _complete(_read(origin), origin)
+    return _complete(_read(str(name_or_path)), str(name_or_path))
 
 
 def doubts(name_or_path: str | Path) -> list[str]:

@@ -201,14 +201,10 @@ class PlaybackClock:
     def due(self, elapsed: float) -> float:
         """Return how much time to show, s, given the time on the wall since the last call, s."""
         ticks, self._steps = self._steps, 0
-        if self.paused:
-            self._owed = 0.0
-        else:
-            self._owed += min(elapsed, LONGEST) * self.speed
-            whole = int(self._owed / self._tick + 1e-9)
-            self._owed = max(self._owed - whole * self._tick, 0.0)
-            ticks += whole
-        return ticks * self._tick
+        self._owed = 0.0 if self.paused else self._owed + min(elapsed, LONGEST) * self.speed
+        whole = int(self._owed / self._tick + 1e-9)
+        self._owed = max(self._owed - whole * self._tick, 0.0)
+        return (ticks + whole) * self._tick
 
 
 def add_time_controls(inputs: Inputs, clock: PlaybackClock) -> None:
