@@ -50,11 +50,7 @@ def write_atomically(path: Path, content: bytes) -> None:
 
 
 def write_json(path: Path, value: object) -> None:
-    """Write a value as readable JSON; an existing file stays whole if that fails.
-
-    Raises:
-        TraceError: The file cannot be written.
-    """
+    """Write a value as readable JSON, as ``write_atomically`` does."""
     write_atomically(path, json_text(value).encode())
 
 
