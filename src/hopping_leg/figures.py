@@ -82,9 +82,9 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     return wrapper
 
 
-def panels(rows: int, columns: int = 1, height: float = 2.2) -> tuple[Figure, list[list[Axes]]]:
-    """Return a figure of panels that share their axes; a row's height is in inches."""
-    figure = Figure(figsize=(WIDTH, height * rows + 0.5), layout="constrained")
+def panels(rows: int, columns: int = 1) -> tuple[Figure, list[list[Axes]]]:
+    """Return a figure of panels that share their axes."""
+    figure = Figure(figsize=(WIDTH, 2.2 * rows + 0.5), layout="constrained")
     axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     return figure, [list(row) for row in axes]
 

@@ -41,7 +41,8 @@ def run(args: Report) -> None:
             flight_recording.recover(path).save(path.with_suffix(".parquet"))
     runs = [trials.load_run(path) for path in args.traces]
     controllers = list(dict.fromkeys(run.controller for run in runs))
-    for picture in report.draw_report_figures(result.tabulate(runs, controllers, seed=0), runs):
-        path = args.out / f"{picture.name}.{args.format}"
-        io.write_atomically(path, encode(picture.figure, args.format))
-        say(f"{picture.title}: {path}")
+    evaluation = result.tabulate(runs, controllers, seed=0)
+    for name, figure in report.draw_report_figures(evaluation, runs).items():
+        path = args.out / f"{name}.{args.format}"
+        io.write_atomically(path, encode(figure, args.format))
+        say(path)

@@ -1,18 +1,16 @@
 """Figures: heights over time, phase space, distributions, ladder, robustness."""
 
-import itertools
 import math
 from collections.abc import Mapping
 from statistics import median
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from hopping_leg import hop_detection
-from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.arrays import Array
 from hopping_leg.evaluate.metrics import START_SECONDS, SWITCH_SECONDS, stretches
 from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.figures import COMMAND, TORQUE_MAP, WIDTH, controller_colours, panels, styled
@@ -20,7 +18,6 @@ from hopping_leg.trace import Trace
 
 _PHASE_SPACE_SECONDS = 10.0  # of the paper's trial
 _TYPICAL = 99.0  # percentile up to which a scale reaches, where single ticks are far outside
-_ENOUGH = 5  # hops from which on a shape is drawn around the dots
 _COLUMNS = 4  # panels of robustness beside each other
 
 
@@ -58,31 +55,26 @@ def _draw_heights(axes: Axes, trace: Trace, paint: str) -> None:
 def draw_phase_space(traces: Mapping[str, Trace]) -> Figure:
     """Draw the torque that controllers asked of the knee at every configuration they met.
 
-    A row per controller, all on the same axes and colours. Line: one example phase; circle: its
-    start; diamond: its end. Of a run at a constant command 10 s after the start are drawn, or what
-    there is of a shorter one.
+    A row per controller, all on the same axes and colours. Of a run at a constant command 10 s
+    after the start are drawn, or what there is of a shorter one.
     """
-    figure = Figure(figsize=(WIDTH, 3.0 * len(traces) + 0.4), layout="constrained")
-    panels = figure.subplots(len(traces), 2, sharex=True, sharey=True, squeeze=False)
+    figure, axes = panels(len(traces), 2)
     shown = {name: _phase_space(trace) for name, trace in traces.items()}
     torques = [np.abs(found["knee_command_nm"]) for found in shown.values()]
     ranges = [float(np.nanpercentile(t, _TYPICAL)) for t in torques if np.isfinite(t).any()]
     limit = median(ranges or [0.0]) or 1.0
     look: dict[str, Any] = {"cmap": TORQUE_MAP, "vmin": -limit, "vmax": limit, "s": 9}
     look |= {"edgecolors": "0.6", "linewidths": 0.2, "rasterized": True}
-    for row, (name, found) in zip(panels, shown.items(), strict=True):
+    for row, (name, found) in zip(axes, shown.items(), strict=True):
         angle, speed, torque, clearance = found.values()
         flight = clearance >= hop_detection.FLIGHT_CLEARANCE
-        for axes, title, phase in ((row[0], "flight", flight), (row[1], "stance", ~flight)):
-            dots = axes.scatter(angle[phase], speed[phase], c=torque[phase], **look)
-            _draw_example_phase(axes, angle, speed, phase)
-            axes.set_title(f"{name}, {title}" if name else title)
+        for panel, title, phase in ((row[0], "flight", flight), (row[1], "stance", ~flight)):
+            dots = panel.scatter(angle[phase], speed[phase], c=torque[phase], **look)
+            panel.set_title(f"{name}, {title}")
         row[0].set_ylabel("knee velocity / (rad/s)")
-    for axes in panels[-1]:
-        axes.set_xlabel("knee angle / rad")
-    if panels[0][0].get_legend_handles_labels()[0]:
-        panels[0][0].legend(loc="lower right")
-    figure.colorbar(dots, ax=panels, label="knee torque asked for / N m", extend="both", aspect=40)
+    for panel in axes[-1]:
+        panel.set_xlabel("knee angle / rad")
+    figure.colorbar(dots, ax=np.array(axes), label="knee torque / N m", extend="both", aspect=40)
     return figure
 
 
@@ -96,84 +88,45 @@ def _phase_space(trace: Trace) -> dict[str, Array]:
     return {name: trace.column(name)[chosen] for name in names}
 
 
-def _draw_example_phase(axes: Axes, angle: Array, speed: Array, phase: BoolArray) -> None:
-    """Draw the complete phase of median length."""
-    edges = np.flatnonzero(np.diff(phase)) + 1
-    spans = [(a, b) for a, b in itertools.pairwise(edges) if phase[a]]
-    if not spans:
-        return
-    start, end = sorted(spans, key=lambda span: span[1] - span[0])[len(spans) // 2]
-    axes.plot(angle[start:end], speed[start:end], color="black", linewidth=1.3)
-    look: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyle": "none"}
-    for tick, marker, label in ((start, "o", "start"), (end - 1, "D", "end")):
-        axes.plot(angle[tick], speed[tick], marker=marker, markersize=7, label=label, **look)
-
-
 @styled
 def draw_distributions(evaluation: Evaluation) -> Figure:
-    """Draw every hop as a dot, the distribution around it, its median and the command."""
-    controllers = evaluation.controllers
+    """Draw how the apexes at every command are distributed, their range, median and command."""
     commands = sorted({row.command_m for row in evaluation.summary})
-    apexes = {
-        (e["controller"], e["command_m"]): np.array(e["apexes_m"]) for e in evaluation.distributions
-    }
     figure = Figure(figsize=(WIDTH, 4.2), layout="constrained")
     axes = figure.subplots()
-    slot = 0.8 / len(controllers)
-    rng = np.random.default_rng(0)
-    for place, command in enumerate(commands):
-        axes.hlines(command, place - 0.45, place + 0.45, color=COMMAND, linewidth=1.2)
-    for index, (controller, paint) in enumerate(controller_colours(controllers).items()):
-        for place, command in enumerate(commands):
-            apex = apexes.get((controller, command), np.empty(0))
-            if len(apex):
-                centre = place - 0.4 + slot * (index + 0.5)
-                _draw_distribution(axes, apex, centre, slot, paint, rng)
+    at = np.arange(len(commands))
+    axes.hlines(commands, at - 0.45, at + 0.45, color=COMMAND, linewidth=1.2, label="command")
+    colours = controller_colours(evaluation.controllers)
+    slot = 0.8 / len(colours)
+    for index, (controller, paint) in enumerate(colours.items()):
+        look: dict[str, Any] = {"facecolor": (paint, 0.3), "linecolor": paint, "showmedians": True}
+        for found in evaluation.distributions:
+            if found["controller"] == controller and found["apexes_m"]:
+                centre = commands.index(found["command_m"]) - 0.4 + slot * (index + 0.5)
+                axes.violinplot([found["apexes_m"]], [centre], widths=0.9 * slot, **look)
         axes.plot([], [], color=paint, linewidth=3, label=controller)
-    axes.plot([], [], color=COMMAND, linewidth=1.2, label="command")
-    axes.set_xticks(range(len(commands)), [f"{c:.2f}" for c in commands])
+    axes.set_xticks(at, [f"{c:.2f}" for c in commands])
     axes.grid(visible=False, axis="x")
     axes.set(xlabel="commanded apex height / m", ylabel="apex height / m")
-    figure.legend(loc="outside upper right", ncols=min(len(controllers) + 1, 4))
+    figure.legend(loc="outside upper right", ncols=4)
     return figure
-
-
-def _draw_distribution(
-    axes: Axes, apex: Array, centre: float, slot: float, paint: str, rng: np.random.Generator
-) -> None:
-    if len(apex) >= _ENOUGH and np.ptp(apex) > 0:
-        parts = axes.violinplot([apex], [centre], widths=0.9 * slot, showextrema=False, points=200)
-        for body in cast("list[PolyCollection]", parts["bodies"]):
-            body.set(facecolor=paint, alpha=0.25, edgecolor="none")
-    at = centre + rng.uniform(-0.18, 0.18, len(apex)) * slot
-    look: dict[str, Any] = {"markersize": 2.5, "alpha": 0.6, "markeredgecolor": "none"}
-    dots, *_ = axes.plot(at, apex, ".", color=paint, **look)
-    dots.set_rasterized(True)  # thousands of them; as shapes they make a file of megabytes
-    axes.hlines(np.median(apex), centre - 0.42 * slot, centre + 0.42 * slot, color=paint, lw=2.2)
 
 
 @styled
 def draw_ladder(evaluation: Evaluation) -> Figure:
-    """Draw median apex and error over the command; bars are one standard deviation over hops."""
+    """Draw the median error over the command; bars are one standard deviation over hops."""
     figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
-    apex, error = figure.subplots(1, 2)
-    controllers = list(dict.fromkeys(row.controller for row in evaluation.ladder))
-    commands = sorted({row.command_m for row in evaluation.ladder})
-    apex.plot(commands, commands, color=COMMAND, linewidth=1.2, label="command")
-    error.axhline(0, color=COMMAND, linewidth=1.2)
-    for index, (name, paint) in enumerate(controller_colours(controllers).items()):
+    axes = figure.subplots()
+    colours = controller_colours(row.controller for row in evaluation.ladder)
+    axes.axhline(0, color=COMMAND, linewidth=1.2)
+    for index, (name, paint) in enumerate(colours.items()):
         rows = [row for row in evaluation.ladder if row.controller == name]
-        at, median, spread = np.array([(r.command_m, r.median_error_m, r.std_m) for r in rows]).T
-        look: dict[str, Any] = {"color": paint, "marker": "o", "markersize": 3.5, "linewidth": 1.2}
-        apex.plot(at, at + median, label=name, **look)
-        aside = at + 0.0012 * (index - (len(controllers) - 1) / 2)
-        error.errorbar(aside, 1e3 * median, 1e3 * spread, capsize=2, elinewidth=0.9, **look)
-    for axes in (apex, error):
-        axes.set_xticks(commands[::2], [f"{c:.2f}" for c in commands[::2]])
-        axes.set_xlabel("commanded apex height / m")
-    apex.set_ylabel("median apex height / m")
-    error.set_ylabel("apex - command / mm, median and std")
-    apex.legend()
+        at, error, spread = np.array([(r.command_m, r.median_error_m, r.std_m) for r in rows]).T
+        aside = at + 0.0012 * (index - (len(colours) - 1) / 2)
+        look: dict[str, Any] = {"color": paint, "marker": "o", "markersize": 3.5, "capsize": 2}
+        axes.errorbar(aside, 1e3 * error, 1e3 * spread, label=name, **look)
+    axes.set(xlabel="commanded apex height / m", ylabel="apex - command / mm, median and std")
+    axes.legend()
     return figure
 
 
