@@ -127,7 +127,7 @@ def _family_row(name: str, rows: Sequence[Row]) -> Row:
     return {
         "family": name,
         "trials": len(own),
-        "unsafe": _unsafe(own),
+        "unsafe": sum(bool(row["problems"]) for row in own),
         "reasons": dict(reasons.most_common()),
         "reaction_p99_s": _percentile(reactions, 99),
         "shown_p50_s": _percentile(shown, 50),
@@ -138,10 +138,6 @@ def _family_row(name: str, rows: Sequence[Row]) -> Row:
 
 def _percentile(values: Sequence[float], share: float) -> float | None:
     return float(np.percentile(values, share, method="higher")) if values else None
-
-
-def _unsafe(rows: Sequence[Row]) -> int:
-    return sum(bool(row["problems"]) for row in rows)
 
 
 def play_block(cases: Sequence[Case]) -> Row:

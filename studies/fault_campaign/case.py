@@ -100,13 +100,7 @@ class Result:
 
 
 class Scene:
-    """All that is drawn for a trial.
-
-    Args:
-        case: Which.
-        family: Of its mishap.
-        robot: Loaded.
-    """
+    """All that is drawn for a trial of a family, on a robot that the host is told."""
 
     def __init__(self, case: Case, family: Family, robot: Robot) -> None:
         rng = case.rng

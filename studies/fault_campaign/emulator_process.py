@@ -6,9 +6,11 @@ with EmulatorProcess(EmulatorConfig(robot="legv2")) as emulator:
 """
 
 import multiprocessing
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import cast
 
 from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
 from hopping_leg.emulator.faults import Fault
@@ -43,7 +45,7 @@ class EmulatorRecord:
     """Those that began, with when, s."""
 
 
-class EmulatorProcess:
+class EmulatorProcess(AbstractContextManager["EmulatorProcess"]):
     """A running emulator; ``path`` is the terminal that the host opens.
 
     Raises:
@@ -63,32 +65,21 @@ class EmulatorProcess:
 
     def state(self) -> EmulatorState:
         """Return the truth about the robot now."""
-        state = self._ask("state")
-        assert isinstance(state, EmulatorState)
-        return state
+        return cast(EmulatorState, self._ask("state"))
 
     def record(self) -> EmulatorRecord:
         """Return what went over the wire and which faults began."""
-        record = self._ask("record")
-        assert isinstance(record, EmulatorRecord)
-        return record
+        return cast(EmulatorRecord, self._ask("record"))
 
     def inject(self, fault: Fault) -> None:
         """Let a fault happen; its time counts from now."""
         self._ask(fault)
 
-    def close(self) -> None:
-        """End the process."""
+    def __exit__(self, *_: object) -> None:
         self._pipe.close()
         self._process.join(5)
         self._process.kill()
         self._process.join()
-
-    def __enter__(self) -> "EmulatorProcess":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _ask(self, request: str | Fault) -> object:
         self._pipe.send(request)

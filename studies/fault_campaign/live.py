@@ -48,16 +48,7 @@ _AFTERWARDS = 0.15
 
 
 def play_live(case: Case, family: Family, robot: Robot) -> Result:
-    """Run and judge a trial.
-
-    Args:
-        case: Which.
-        family: Of its mishap, one of ``LIVE``.
-        robot: Loaded.
-
-    Raises:
-        KeyboardInterrupt: A signal stopped the leg.
-    """
+    """Run and judge a trial of a family of ``LIVE``; a signal raises ``KeyboardInterrupt``."""
     scene = Scene(case, family, robot)
     with EmulatorProcess(scene.start) as emulator, tempfile.TemporaryDirectory() as folder:
         if scene.mishap.dies:

@@ -93,13 +93,7 @@ def _braking(drive: EmulatedDrive) -> bool:
 
 
 def play(case: Case, family: Family, robot: Robot) -> Result:
-    """Run and judge a trial.
-
-    Args:
-        case: Which.
-        family: Of its mishap.
-        robot: Loaded.
-    """
+    """Run and judge a trial."""
     scene = Scene(case, family, robot)
     result = _refused(scene) if family.refused else _hop(scene)
     if scene.mishap.dies:

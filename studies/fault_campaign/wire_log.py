@@ -5,7 +5,7 @@ soon after a bad answer the host reacted. Times are in s; joint 0 is the hip, 1 
 """
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from moteus.protocol import Register, parse_reply
@@ -53,10 +53,10 @@ _REMEMBERED = 100_000  # Commands and answers each, about a minute's
 
 
 class WireLog:
-    """Commands, answers and changes of mode in the order of time; the oldest are forgotten."""
+    """Commands that wrote a mode, answers, changes of mode; the oldest are forgotten."""
 
     def __init__(self) -> None:
-        self._commands: deque[CommandEvent] = deque(maxlen=_REMEMBERED)
+        self.commands: deque[CommandEvent] = deque(maxlen=_REMEMBERED)
         self._replies: deque[tuple[float, int, bytes]] = deque(maxlen=_REMEMBERED)
         self.changes: deque[ModeChange] = deque(maxlen=_REMEMBERED)
         self._modes = [DriveMode.STOPPED, DriveMode.STOPPED]
@@ -70,12 +70,7 @@ class WireLog:
             mode = DriveMode(int(written[Register.MODE]))
             torque = float(written.get(Register.COMMAND_FEEDFORWARD_TORQUE, 0.0))
             most = float(written.get(Register.COMMAND_POSITION_MAX_TORQUE, 0.0))
-            self._commands.append(CommandEvent(time, joint, mode, torque, most))
-
-    @property
-    def commands(self) -> Sequence[CommandEvent]:
-        """The commands that wrote a drive's mode."""
-        return self._commands
+            self.commands.append(CommandEvent(time, joint, mode, torque, most))
 
     def answers(self, since: float = 0.0) -> Iterator[ReplyEvent]:
         """Yield the answers that told a drive's state, from a time on, s."""
@@ -84,14 +79,9 @@ class WireLog:
                 continue
             values = parse_reply(data)
             if values.keys() >= set(_TOLD):
-                yield ReplyEvent(
-                    time,
-                    joint,
-                    DriveMode(int(values[Register.MODE])),
-                    int(values[Register.FAULT]),
-                    values[Register.VOLTAGE],
-                    values[Register.TEMPERATURE],
-                )
+                mode, fault, voltage, temperature = (values[register] for register in _TOLD)
+                mode = DriveMode(int(mode))
+                yield ReplyEvent(time, joint, mode, int(fault), voltage, temperature)
 
     def record_mode(self, time: float, joint: int, mode: DriveMode) -> None:
         """Note a drive's mode after a step, if it is another."""

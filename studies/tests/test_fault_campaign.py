@@ -143,15 +143,12 @@ def test_a_trial_in_real_time_is_safe(family):
     assert row["disturbed"] or row["reason"] == "DRIVE_FAULT" or row["braked"] < 0.2
 
 
-@pytest.mark.parametrize(
-    ("reason", "slow"), [("loop_stalled", True), ("drive_fault", False), (None, False)]
-)
+@pytest.mark.parametrize(("reason", "slow"), [("loop_stalled", True), ("drive_fault", False)])
 def test_a_host_that_was_too_slow_had_given_up_before_its_death(tmp_path, reason, slow):
     assert not gave_up(tmp_path)
     box = FlightRecorder(tmp_path / f"run{SUFFIX}", ("time_s",), {})
     box.row((0.0,))
-    if reason:
-        box.event(reason=reason)
+    box.event(reason=reason)
     box.close()
     assert gave_up(tmp_path) is slow
     (tmp_path / f"run{SUFFIX}").write_bytes(b"")
@@ -159,7 +156,6 @@ def test_a_host_that_was_too_slow_had_given_up_before_its_death(tmp_path, reason
 
 
 def test_a_bound_of_a_rate_without_failures_is_that_of_the_binomial_distribution():
-    assert upper_bound(3000, 0) == pytest.approx(3 / 3000, rel=2e-3)
     for trials in (1, 20, 3000):
         assert (1 - upper_bound(trials, 0)) ** trials == pytest.approx(0.05)
     assert upper_bound(0, 0) is None
@@ -221,10 +217,8 @@ def test_torque_after_a_stop_is_a_restart_only_since_the_fault():
 @pytest.mark.parametrize(
     "bad",
     [
-        answered(1.0, DriveMode.FAULT),
-        answered(1.0, DriveMode.TIMEOUT),
-        answered(1.0, voltage=43.0),
-        answered(1.0, voltage=17.0),
+        *(answered(1.0, mode) for mode in (DriveMode.FAULT, DriveMode.TIMEOUT)),
+        *(answered(1.0, voltage=voltage) for voltage in (17.0, 43.0)),
         answered(1.0, temperature=math.nan),
     ],
 )
