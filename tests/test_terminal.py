@@ -16,7 +16,7 @@ def test_where_there_is_no_terminal_lines_say_which_part_it_is(capsys, monkeypat
         bar.show("fast", 1.0)
         bar.show("slow", 0.5, "2 hops", about=", soft floor")
     lines = capsys.readouterr().err.splitlines()
-    assert lines == ["1 of 2: fast 50 %", "2 of 2: slow, soft floor 75 % 2 hops"]
+    assert lines == ["1 of 2: fast 50 %", "2 of 2: slow, soft floor 75 %, 1 s left 2 hops"]
 
 
 @pytest.mark.parametrize("terminal", [True, False])
