@@ -68,8 +68,8 @@ class Progress(contextlib.AbstractContextManager["Progress"]):
         if self._bar.disable and time.monotonic() - self._said >= _LINE_SECONDS:
             self._said = time.monotonic()
             left = self._bar.tasks[0].time_remaining
-            said = f"{label} {100 * share:.0f} %" + (f", {left:.0f} s left" if left else "")
-            self._console.print(f"{said} {note}".strip(), soft_wrap=True)
+            rest = f", {left:.0f} s left" if left else ""
+            self._console.print(f"{label} {100 * share:.0f} %{rest} {note}".strip(), soft_wrap=True)
 
     def __enter__(self) -> Self:
         """Start drawing."""

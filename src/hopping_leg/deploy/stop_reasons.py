@@ -181,11 +181,9 @@ class Counts:
         elapsed = reply.taken - last.taken
         if not 0 < elapsed < _GAP * limits.period:
             return drift
-        unexplained = _unexplained(last, reply)
-        if self.evidence[index].shaken > _IMPACT:
-            most = _DRIFT_SPEED * elapsed
-            unexplained = max(-most, min(most, unexplained))
-        return drift * math.exp(-elapsed / _DRIFT_SECONDS) + unexplained
+        most = _DRIFT_SPEED * elapsed if self.evidence[index].shaken > _IMPACT else math.inf
+        gained = max(-most, min(most, _unexplained(last, reply)))
+        return drift * math.exp(-elapsed / _DRIFT_SECONDS) + gained
 
     def _of_drive(
         self, index: int, limits: SafetyLimits, reply: Reply | None
