@@ -20,6 +20,7 @@ def test_the_result_says_what_it_was_made_from_how_it_was_judged_and_within_whic
     assert tree["robot_digest"] == identified().robot.digest
     (one,) = tree["search"]["passes"]
     assert one["history"][-1] == one["cost"]
+    assert (one["other_starts"], tree["search"]["scoring"]["velocity"]) == ([], None)
     for part in (tree["validation"], tree["start_validation"]):
         assert len(part["closed_loop_position_rms_rad"]) == 2
         assert len(part["closed_loop_torque_rms_nm"]) == 2

@@ -6,7 +6,7 @@ Before one is made it is checked whether the leg can follow: reach, joint range,
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 import polars as pl
@@ -21,16 +21,12 @@ from hopping_leg.trace import Trace
 LEAST_CLEARANCE = 0.005  # of base and knee above the ground, m
 
 
-@dataclass(frozen=True)
-class Demand:
+class Demand(NamedTuple):
     """What a trajectory asks of the joints, rad, rad/s and N m, (ticks, 2) each."""
 
     position: Array
     velocity: Array
     torque: Array
-    clearance: Array
-    """Height of base and knee above the ground on which the foot stands, m; infinite where the base
-    is clamped."""
 
 
 class Template(Protocol):
@@ -73,12 +69,7 @@ def demand(robot: Robot, rig: Rig, position: Array, rate: float) -> Demand:
     inner = np.diff(position, 2, axis=0) * rate**2
     acceleration = np.pad(inner, ((1, 1), (0, 0)), mode="edge")
     torque = inverse_dynamics(robot, rig, position, velocity, acceleration)
-    clearance = np.full_like(position, np.inf)
-    if rig != "fixed-base":
-        height = kinematics.stance_height(robot, position)
-        clearance[:, 0] = kinematics.base_clearance(robot, height)
-        clearance[:, 1] = kinematics.knee_clearance(robot, height, position)
-    return Demand(position, velocity, torque, clearance)
+    return Demand(position, velocity, torque)
 
 
 def possible_demand(template: Template, robot: Robot, rate: float) -> tuple[Array, Demand]:
@@ -92,7 +83,10 @@ def possible_demand(template: Template, robot: Robot, rate: float) -> tuple[Arra
     if len(time) < 3:
         raise UsageError(f"The excitation has only {len(time)} samples; make it longer.")
     wanted = demand(robot, template.rig, template.joints(robot, time), rate)
-    q, speed, torque, clearance = vars(wanted).values()
+    q, speed, torque = wanted
+    height = kinematics.stance_height(robot, q)
+    ground = (kinematics.base_clearance(robot, height), kinematics.knee_clearance(robot, height, q))
+    clearance = np.stack(ground, axis=1) + (np.inf if template.rig == "fixed-base" else 0.0)
     low, high = robot.of_joints("stop_lower"), robot.of_joints("stop_upper")
     fastest, possible = robot.of_joints("no_load_speed"), MotorLimit(robot).clip(torque, speed)
     outside, low_down = (q < low) | (q > high), clearance < LEAST_CLEARANCE
@@ -168,6 +162,8 @@ class Multisine:
 
 RATE = 200.0
 """Rate of the paper's recordings, Hz."""
+TARGETS = PAIRS["position_command"] + PAIRS["velocity_command"]
+"""A recording's columns of targets."""
 _KEY = "excitation"
 _FACTS = {"rig": "rig", "rate_hz": "rate", "robot": "robot", "description": "description"}
 
@@ -192,13 +188,16 @@ class Excitation:
     def __len__(self) -> int:
         return len(self.time)
 
+    @property
+    def table(self) -> pl.DataFrame:
+        """Time and targets in a recording's columns."""
+        targets = np.column_stack([self.time, self.position, self.velocity])
+        return pl.DataFrame(targets, ("time_s", *TARGETS))
+
     def save(self, path: Path) -> None:
         """Write a Parquet file, or raise TraceError if that fails."""
-        names = (*PAIRS["position_command"], *PAIRS["velocity_command"])
-        targets = (*self.position.T, *self.velocity.T)
-        columns = {"time_s": self.time} | dict(zip(names, targets, strict=True))
         facts = {name: getattr(self, field) for name, field in _FACTS.items()}
-        Trace(pl.DataFrame(columns), {_KEY: facts}).save(path)
+        Trace(self.table, {_KEY: facts}).save(path)
 
 
 def load_excitation(path: Path) -> Excitation:
@@ -209,9 +208,9 @@ def load_excitation(path: Path) -> Excitation:
         raise TraceError(f"{path} is no excitation; write one with `hop record`.")
     if not is_number(facts["rate_hz"]) or not facts["rate_hz"] > 0:
         raise TraceError(f"{path} has no rate; write it again with `hop record`.")
-    pairs = (PAIRS[f"{quantity}_command"] for quantity in ("position", "velocity"))
-    position, velocity = (np.column_stack([trace.column(c) for c in pair]) for pair in pairs)
-    return Excitation(trace.column("time_s"), position, velocity, *(facts[n] for n in _FACTS))
+    targets = np.column_stack([trace.column(name) for name in TARGETS])
+    time, facts = trace.column("time_s"), [facts[name] for name in _FACTS]
+    return Excitation(time, targets[:, :2], targets[:, 2:], *facts)
 
 
 def make_excitation(
@@ -222,7 +221,6 @@ def make_excitation(
     With ``track_velocity`` the velocity targets are the positions' derivative, as in the lab's
     recordings; otherwise they are zero, as the paper says.
     """
-    time, wanted = possible_demand(template, robot, rate)
-    velocity = wanted.velocity if track_velocity else np.zeros_like(wanted.velocity)
-    said = (template.rig, rate, robot.name, str(template))
-    return Excitation(time, wanted.position, velocity, *said)
+    time, (position, velocity, _) = possible_demand(template, robot, rate)
+    velocity = velocity if track_velocity else np.zeros_like(velocity)
+    return Excitation(time, position, velocity, template.rig, rate, robot.name, str(template))

@@ -1,21 +1,20 @@
 """Recordings of an excitation: played on a simulated leg, or cut from a trace of motors."""
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import polars as pl
 
 from hopping_leg.controllers.joint_pd import JointGains, JointPD
 from hopping_leg.errors import PhysicsError, RecordingError
-from hopping_leg.identify.excitation import Excitation
+from hopping_leg.identify.excitation import TARGETS, Excitation
 from hopping_leg.identify.recording import Recording, make_recording
-from hopping_leg.identify.recording_format import MEASURED, PAIRS, RecordingMetadata
+from hopping_leg.identify.recording_format import MEASURED, RecordingMetadata
 from hopping_leg.robot import TIMESTEP, Robot
 from hopping_leg.sim import NO_NOISE, LegSimulator, Plant
 from hopping_leg.trace import Trace
 
-_TARGETS = PAIRS["position_command"] + PAIRS["velocity_command"]
 _IMPOSSIBLE = 1e4  # joint speed that no leg reaches, rad/s
 
 
@@ -55,10 +54,11 @@ def play(
     no_command = np.zeros(1)
     plant.channel.restart(slice(None), legs.measured_q, legs.measured_qd, no_command)
     rows = np.empty((len(excitation), 8))
-    for tick in range(len(excitation)):
-        rows[tick, 0:2], rows[tick, 2:4] = legs.measured_q[0], legs.measured_qd[0]
-        rows[tick, 4:6] = legs.measured_torque[0]
-        rows[tick, 6], rows[tick, 7] = legs.height[0], legs.foot_clearance()[0]
+    for tick, row in enumerate(rows):
+        row[:6] = np.concatenate(
+            [legs.measured_q, legs.measured_qd, legs.measured_torque], axis=None
+        )
+        row[6:] = legs.height[0], legs.foot_clearance()[0]
         plant.drive(controller.act(plant.sense(no_command)))
         if on_tick is not None:
             on_tick(tick + 1, len(excitation))
@@ -68,36 +68,20 @@ def play(
             " take a smaller one or weaker gains."
         )
     source = f"simulated: {robot.name} ({robot.digest}), seed {seed}"
-    values = (*rows[:, :6].T, *excitation.position.T, *excitation.velocity.T)
-    columns = {"time_s": excitation.time} | dict(zip(MEASURED + _TARGETS, values, strict=True))
+    table = excitation.table.hstack(pl.DataFrame(rows[:, :6], MEASURED))
     if not fixed:
-        columns |= {"height_m": rows[:, 6], "contact": rows[:, 7] <= 0}
+        table = table.with_columns(height_m=rows[:, 6], contact=rows[:, 7] <= 0)
     header = {"robot": robot.name, "robot_digest": robot.digest, "seed": seed}
-    header["timestep_s"] = timestep
-    table = pl.DataFrame(columns)
-    return _filed(table, excitation, believed, gains, source, robot.name, header)
+    header |= {"timestep_s": timestep, "excitation": excitation.description}
+    metadata = _metadata(excitation, believed, source, gains)
+    return make_recording(table, metadata, robot.name, header=header)
 
 
-def _filed(
-    table: pl.DataFrame,
-    excitation: Excitation,
-    believed: str,
-    gains: JointGains,
-    source: str,
-    name: str,
-    header: dict[str, Any],
-) -> Recording:
-    metadata = RecordingMetadata(
-        excitation.rig,
-        excitation.rate,
-        believed,
-        source,
-        onboard="zoh",
-        stiffness=gains.stiffness,
-        damping=gains.damping,
-    )
-    header["excitation"] = excitation.description
-    return make_recording(table, metadata, name, header=header)
+def _metadata(
+    excitation: Excitation, believed: str, source: str, gains: JointGains
+) -> RecordingMetadata:
+    made = RecordingMetadata(excitation.rig, excitation.rate, believed, source, onboard="zoh")
+    return replace(made, stiffness=gains.stiffness, damping=gains.damping)
 
 
 def recording_of(
@@ -109,15 +93,17 @@ def recording_of(
     a reply have no measurement. The joint PD runs on the host, once per row; ``believed`` is the
     robot file that the recording is filed under. RecordingError says that it was not played.
     """
-    lacking = [column for column in MEASURED + _TARGETS if column not in trace.table.columns]
+    lacking = [column for column in MEASURED + TARGETS if column not in trace.table.columns]
     if lacking:
         raise RecordingError(f"{name} has no column '{lacking[0]}'; no excitation was played.")
-    table = trace.table.filter(pl.col(_TARGETS[0]).is_finite())
+    table = trace.table.filter(pl.col(TARGETS[0]).is_finite())
     if not table.height:
         raise RecordingError(f"{name} ended before the excitation began; see its events.")
     first = float(table["time_s"][0])
     time = np.round(table["time_s"].to_numpy() - first, 9)
     source = f"motors on {trace.header.get('transport')}, {trace.header.get('started')}"
-    header = {"run": {k: v for k, v in trace.header.items() if k != "events"}}
-    table = table.select(pl.Series("time_s", time), *MEASURED, *_TARGETS)
-    return _filed(table, excitation, believed, gains, source, name, header)
+    run = {k: v for k, v in trace.header.items() if k != "events"}
+    table = table.select(pl.Series("time_s", time), *MEASURED, *TARGETS)
+    metadata = _metadata(excitation, believed, source, gains)
+    header = {"run": run, "excitation": excitation.description}
+    return make_recording(table, metadata, name, header=header)

@@ -94,7 +94,7 @@ def as_json(identified: Identified, posterior: int = 0) -> dict[str, Any]:
         "cannot_tell": known.statements,
         "search": {
             "method": plan.search,
-            "scoring": asdict(plan.scoring),
+            "scoring": {**asdict(plan.scoring), "velocity": None},  # never scored
             "window_s": plan.window,
             "stride_s": plan.window,
             "unscored_s": plan.unscored,
@@ -106,6 +106,7 @@ def as_json(identified: Identified, posterior: int = 0) -> dict[str, Any]:
                     "cost": one.found.cost,
                     "candidates": one.found.evaluations,
                     "history": one.found.history,
+                    "other_starts": [],
                 }
                 for one in identified.passes
             ],
