@@ -40,26 +40,27 @@ def emulated():
     """What starts an emulator in lockstep, to be closed after the test."""
     with contextlib.ExitStack() as running:
 
-        def start(**options):
-            lockstep = Lockstep(EmulatorConfig(robot="legv2-paper", **options).build())
+        def start(robot="legv2-paper", **options):
+            lockstep = Lockstep(EmulatorConfig(robot=robot, **options).build())
             running.callback(lockstep.link.close)
             return lockstep
 
         yield start
 
 
-def run(lockstep, path, *, controller="energy-shaping", hop=0.5, rise=0.5, checked=None):
-    controller = load_controller(controller, LEG)
+def run(lockstep, path, controller="energy-shaping", *, hop=0.5, rise=0.5, checked=None):
+    leg = lockstep.robot.robot
+    controller = load_controller(controller, leg)
     sequence = MotionSequence(
         controller,
         CommandSchedule(((0.3, 100.0),)),
-        hopping_poses(LEG),
-        SoftLimiter(LEG, SoftLimits()),
+        hopping_poses(leg),
+        SoftLimiter(leg, SoftLimits()),
         SequenceTiming(hop=hop, rise=rise, settle=0.2, sink=0.6),
         checked=checked,
     )
-    header = header_of(LEG, controller, 200.0)
-    return perform(lockstep.link, sequence, LIMITS, path, header, clock=lockstep, realtime=False)
+    limits, header = hopping_limits(leg, 200.0), header_of(leg, controller, 200.0)
+    return perform(lockstep.link, sequence, limits, path, header, clock=lockstep, realtime=False)
 
 
 @pytest.mark.parametrize("homed", ["hanging", "standing"])
@@ -93,9 +94,6 @@ def test_healthy_drives_pass_every_check_and_say_who_they_are(emulated):
 @pytest.mark.parametrize(
     ("start", "words"),
     [
-        ({"homed": False}, "hip is not homed"),
-        ({"configured": False}, "timeout_mode is 12 but must be 15"),
-        ({"pose": "zero"}, "knee stands at"),
         ({"faults": (Fault("boot_pose", drive="knee"),)}, "knee is not homed"),
         (
             {"faults": (Fault("configuration", name="servo.max_current_A", value=20.0),)},
@@ -168,36 +166,47 @@ def test_a_run_is_a_trace_like_any_other_and_the_motors_give_what_was_sent(emula
         assert np.median(np.abs(difference)) < 0.1
 
 
-QUICK = [
-    (Fault("drive_fault", at=0.9, drive="knee", value=35), "DRIVE_FAULT"),
-    (Fault("silence", at=0.9), "REPLIES_MISSING"),
-    (Fault("drop_reply", at=0.9), "FINISHED"),
-]
-OTHERS = [
-    (Fault("encoder_jump", at=0.9, drive="hip"), "ENCODER_JUMP"),
-    (Fault("over_voltage", at=0.9, value=44.0), "VOLTAGE_HIGH"),
-    (Fault("under_voltage", at=0.9, value=12.0), "VOLTAGE_LOW"),
-    (Fault("over_temperature", at=0.9, value=500.0), "TOO_HOT"),
-    (Fault("power_loss", at=0.9, drive="hip"), "DRIVE_LEFT_MODE"),
-    (Fault("limit_notice", at=0.9), "FINISHED"),
-]
-CASES = [
-    *(("energy-shaping", *case) for case in QUICK),
-    *(pytest.param("fast", *case, marks=pytest.mark.slow) for case in OTHERS),
+FAULTS = [
+    ("legv2-paper", Fault("drive_fault", at=0.9, drive="knee", value=35), "DRIVE_FAULT"),
+    ("legv2-paper", Fault("silence", at=0.9), "REPLIES_MISSING"),
+    ("legv2-paper", Fault("drop_reply", at=0.9), "FINISHED"),
+    *(
+        pytest.param("legv2-identified", fault, reason, marks=pytest.mark.slow)
+        for fault, reason in (
+            (Fault("encoder_jump", at=0.9, drive="hip"), "ENCODER_JUMP"),
+            (Fault("over_voltage", at=0.9, value=44.0), "VOLTAGE_HIGH"),
+            (Fault("under_voltage", at=0.9, value=12.0), "VOLTAGE_LOW"),
+            (Fault("over_temperature", at=0.9, value=500.0), "TOO_HOT"),
+            (Fault("power_loss", at=0.9, drive="hip"), "DRIVE_LEFT_MODE"),
+            (Fault("limit_notice", at=0.9), "FINISHED"),
+        )
+    ),
+    *(
+        ("legv2-identified", Fault(kind, since="flight", at=0.1, drive=drive, value=value), reason)
+        for kind, drive, value, reason in (
+            ("encoder_dead", "knee", None, "ENCODER_DEAD"),
+            ("encoder_dead", "both", None, "ENCODER_DEAD"),
+            ("torque_false", "knee", -1.0, "TORQUE_FALSE"),
+            ("velocity_false", "hip", 2.0, "VELOCITY_FALSE"),
+            ("fast_clock", "knee", 1.05, "DRIVE_CLOCK"),
+            ("limit_notice", "both", None, "FINISHED"),
+        )
+    ),
 ]
 
 
-@pytest.mark.parametrize(("controller", "fault", "reason"), CASES)
+@pytest.mark.parametrize(("robot", "fault", "reason"), FAULTS)
 def test_each_fault_ends_the_run_for_its_reason_and_nothing_starts_again(
-    emulated, tmp_path, controller, fault, reason
+    emulated, tmp_path, robot, fault, reason
 ):
-    done = run(emulated(faults=(fault,)), tmp_path / "run.parquet", controller=controller)
+    controller = "energy-shaping" if robot == "legv2-paper" else "fast"
+    done = run(emulated(robot, faults=(fault,)), tmp_path / "run.parquet", controller, hop=1.2)
     assert done.outcome.supervisor.stop_cause.reason.name == reason
     trace = done.trace
     states = trace.column("state")
     assert (np.diff(states) >= 0).all()
-    stopped = states >= State.DAMPING
-    for joint, limit in zip(("hip", "knee"), LIMITS.torque, strict=True):
+    stopped, limits = states >= State.DAMPING, hopping_limits(load_robot(robot), 200.0).torque
+    for joint, limit in zip(("hip", "knee"), limits, strict=True):
         sent = trace.column(f"{joint}_sent_nm")
         assert np.isfinite(sent).all()
         assert np.abs(sent).max() <= limit
@@ -218,7 +227,7 @@ class Clock(FakeClock):
     stuck = None
 
 
-def fake_run(tmp_path, controller, monkeypatch=None, **options):
+def fake_run(tmp_path, controller):
     clock = Clock()
     link = FakeLink(clock)
     link.trouble = ""
@@ -226,13 +235,12 @@ def fake_run(tmp_path, controller, monkeypatch=None, **options):
         controller, CommandSchedule(((0.3, 100.0),)), POSES, SoftLimiter(LEG, SoftLimits()), SHORT
     )
     header = header_of(LEG, controller, 200.0)
-    options = {"clock": clock, "realtime": False, **options}
-    limits = hopping_limits(load_robot("legv2"), 200.0)
-    return (
-        link,
-        clock,
-        lambda: perform(link, sequence, limits, tmp_path / "run.parquet", header, **options),
-    )
+    limits, file = hopping_limits(load_robot("legv2"), 200.0), tmp_path / "run.parquet"
+
+    def run():
+        return perform(link, sequence, limits, file, header, clock=clock, realtime=False)
+
+    return link, clock, run
 
 
 @pytest.mark.parametrize("method", ["act", "internals"])

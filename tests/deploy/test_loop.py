@@ -74,61 +74,50 @@ def test_an_operator_may_stop_before_and_after_arming(tmp_path, tick, reason):
     assert (BRAKE in link.told) is (tick > 0)
 
 
-@pytest.mark.parametrize(
-    ("controller", "reason", "said"),
-    [
-        (Still(fail_after=10), Reason.CONTROLLER_FAILED, ["ArithmeticError: lost the thread"]),
-        (Still((math.nan, 0.0)), Reason.TORQUE_NOT_FINITE, []),
-    ],
-)
-def test_a_controller_that_fails_damps_the_leg_and_its_words_are_kept(
-    tmp_path, controller, reason, said
-):
-    outcome, link, trace = run(tmp_path, controller)
-    assert outcome.supervisor.stop_cause.reason is reason
-    events = trace.header["events"]
-    assert [e["controller_error"] for e in events if "controller_error" in e] == said
-    assert all(0 <= e["time_s"] <= trace.column("time_s")[-1] for e in events)
-    assert np.isfinite([out.torque for out in link.told]).all()
-
-
 def raiser(error):
-    def fail(*_):
+    def fail():
         raise error
 
     return fail
 
 
-@pytest.mark.parametrize(
-    ("internals", "says"),
-    [
-        (raiser(ArithmeticError("lost")), "ArithmeticError: lost"),
-        (raiser(SystemExit("bye")), "SystemExit: bye"),
-        (raiser(KeyboardInterrupt()), "KeyboardInterrupt"),
-        (lambda: {"other": np.zeros(1)}, "'internals' of controller 'still' names ['other']"),
-        (lambda: {"calls": np.array(["many"])}, "ValueError"),
-        (lambda: None, "TypeError"),
-    ],
-)
-def test_a_controller_that_fails_in_what_it_wants_recorded_brakes_too(tmp_path, internals, says):
+LOST = Reason.CONTROLLER_FAILED
+FAILURES = [
+    ("act", raiser(ArithmeticError("lost")), LOST, "ArithmeticError: lost"),
+    ("act", raiser(SystemExit()), LOST, "SystemExit"),
+    ("act", lambda: np.array([[math.nan, 0.0]]), Reason.TORQUE_NOT_FINITE, None),
+    ("reset", raiser(SystemExit("bye")), LOST, "SystemExit: bye"),
+    ("internals", raiser(ArithmeticError("lost")), LOST, "ArithmeticError: lost"),
+    ("internals", raiser(KeyboardInterrupt()), LOST, "KeyboardInterrupt"),
+    ("internals", lambda: {"other": np.zeros(1)}, LOST, "controller 'still' names ['other']"),
+    ("internals", lambda: {"calls": np.array(["many"])}, LOST, "ValueError"),
+    ("internals", lambda: None, LOST, "TypeError"),
+]
+
+
+@pytest.mark.parametrize(("method", "does", "reason", "says"), FAILURES)
+def test_a_controller_that_fails_brakes_the_leg_and_its_words_are_kept(
+    tmp_path, method, does, reason, says
+):
     controller = Still()
     loop, link, box = make_loop(tmp_path, controller)
-    controller.internals = internals
+    healthy = getattr(controller, method)
+
+    def fails(*given):
+        return does() if controller.calls >= 10 or method == "reset" else healthy(*given)
+
+    setattr(controller, method, fails)
     outcome = loop.run()
     box.close()
-    assert outcome.supervisor.stop_cause.reason is Reason.CONTROLLER_FAILED
-    (said,) = (e["controller_error"] for e in box_events(box) if "controller_error" in e)
-    assert says in said
+    trace = recover(box.path)
+    assert outcome.supervisor.stop_cause.reason is reason
+    events = trace.header["events"]
+    said = [event["controller_error"] for event in events if "controller_error" in event]
+    assert [says in words for words in said] == [True] * (says is not None)
+    assert all(0 <= event["time_s"] <= trace.column("time_s")[-1] for event in events)
+    assert np.isfinite([out.torque for out in link.told]).all()
+    assert BRAKE in link.told
     assert link.told[-1] == STOP
-
-
-@pytest.mark.parametrize("method", ["act", "reset"])
-def test_a_controller_that_wants_to_exit_ends_the_run_and_not_the_process(tmp_path, method):
-    controller = Still()
-    loop, _, box = make_loop(tmp_path, controller)
-    setattr(controller, method, raiser(SystemExit()))
-    assert loop.run().supervisor.stop_cause.reason is Reason.CONTROLLER_FAILED
-    box.close()
 
 
 def test_a_controller_may_not_name_a_column_of_the_loop(tmp_path):
@@ -136,10 +125,6 @@ def test_a_controller_may_not_name_a_column_of_the_loop(tmp_path):
     controller.internals = lambda: {"hip_mode": np.zeros(1)}
     with pytest.raises(ControllerError, match="'hip_mode', which every run has"):
         columns(controller)
-
-
-def box_events(box):
-    return recover(box.path).header["events"]
 
 
 @pytest.mark.parametrize(("each", "reason"), [(0.012, Reason.CONTROLLER_SLOW), (0.0, None)])

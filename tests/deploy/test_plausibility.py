@@ -6,19 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hopping_leg.controllers.command_schedule import CommandSchedule
-from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.drive_link import DriveMode, Reply
-from hopping_leg.deploy.hardware_trials import header_of, perform
-from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
 from hopping_leg.deploy.plausibility import JointEvidence, LagEvidence
 from hopping_leg.deploy.safety_limits import hopping_limits
-from hopping_leg.deploy.stop_reasons import Reason
-from hopping_leg.emulator.faults import Fault
-from hopping_leg.emulator.server import EmulatorConfig
-from hopping_leg.emulator.virtual_time import Lockstep
-from hopping_leg.robot import SoftLimits, load_robot
-from hopping_leg.sim import SoftLimiter
+from hopping_leg.robot import load_robot
 
 PERIOD = 0.005
 MOTOR = hopping_limits(load_robot("legv2"), 200.0).motors[0]
@@ -108,31 +99,3 @@ def test_torques_that_come_later_than_before_make_samples_old(before, after, sta
     for _ in range(3):
         after_a_gap = after_a_gap.after((MOTOR, MOTOR), (reply, reply), pair)
         assert after_a_gap.usual == known.usual
-
-
-@pytest.mark.parametrize(
-    ("kind", "drive", "value", "reason"),
-    [
-        ("encoder_dead", "knee", None, Reason.ENCODER_DEAD),
-        ("encoder_dead", "both", None, Reason.ENCODER_DEAD),
-        ("torque_false", "knee", -1.0, Reason.TORQUE_FALSE),
-        ("velocity_false", "hip", 2.0, Reason.VELOCITY_FALSE),
-        ("fast_clock", "knee", 1.05, Reason.DRIVE_CLOCK),
-        ("", "both", None, Reason.FINISHED),
-    ],
-)
-def test_a_drive_that_lies_in_a_hop_stops_the_leg(tmp_path, kind, drive, value, reason):
-    robot = load_robot("legv2-identified")
-    faults = (Fault(kind, since="flight", at=0.1, drive=drive, value=value),) if kind else ()
-    lockstep = Lockstep(EmulatorConfig(faults=faults).build())
-    controller = load_controller("fast", robot)
-    sequence = MotionSequence(
-        controller, CommandSchedule(((0.3, 9.0),)), hopping_poses(robot),
-        SoftLimiter(robot, SoftLimits()), SequenceTiming(hop=1.2, rise=0.3, settle=0.1, sink=0.5),
-    )  # fmt: skip
-    done = perform(
-        lockstep.link, sequence, hopping_limits(robot, 200.0), tmp_path / "run.parquet",
-        header_of(robot, controller, 200.0), clock=lockstep, realtime=False, threaded=False,
-    )  # fmt: skip
-    lockstep.link.close()
-    assert done.outcome.supervisor.stop_cause.reason is reason

@@ -64,10 +64,13 @@ def test_a_killed_host_leaves_its_record_and_drives_that_brake(emulator, tmp_pat
     assert Trace.load(box.with_suffix(".parquet")).table.height == rows
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP"])
-def test_a_host_that_gets_a_signal_brakes_stops_and_says_so(emulator, tmp_path, name):
-    process, box = deploy(emulator, tmp_path)
-    process.send_signal(getattr(signal, name))
+@pytest.mark.parametrize("name", ["", "SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP"])
+def test_a_host_that_gets_a_signal_or_whose_input_ends_brakes_stops_and_says_so(
+    emulator, tmp_path, name
+):
+    process, box = deploy(emulator, tmp_path, stdin=subprocess.DEVNULL if name else subprocess.PIPE)
+    if name:
+        process.send_signal(getattr(signal, name))
     out, error = process.communicate(timeout=60)
     assert process.returncode in (0, 2)
     assert "Traceback" not in error
@@ -91,14 +94,6 @@ class Stuck:
         while {condition}: pass
         return [[0.0, 0.0]]
 """
-
-
-def test_the_end_of_the_input_stops(emulator, tmp_path):
-    process, box = deploy(emulator, tmp_path, stdin=subprocess.PIPE)
-    process.stdin.close()
-    process.wait(timeout=60)
-    trace = Trace.load(box.with_suffix(".parquet"))
-    assert trace.column("state")[-1] == State.STOPPED
 
 
 @pytest.mark.parametrize("condition", ["True", "time.monotonic() < self.begun + 0.3"])
