@@ -2,10 +2,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers import RolloutConfig, rollout
-from hopping_leg.controllers.energy_shaping import (
-    equations,
-    tuned_energy_shaping,
-)
+from hopping_leg.controllers.energy_shaping import equations, tuned_energy_shaping
 from hopping_leg.controllers.energy_shaping.virtual_leg import Phase
 from hopping_leg.evaluate.metrics import measure
 from hopping_leg.robot import GRAVITY, load_robot

@@ -10,19 +10,16 @@ from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller, load_policy
 from hopping_leg.controllers.rollout import rollout
 from hopping_leg.errors import UsageError
-from hopping_leg.hop_detection import measure_hops
 from hopping_leg.rl.onnx_export import with_card
 from hopping_leg.robot import load_robot
 from hopping_leg.sim.channel import Measurement
+from tests.controllers.measurements import hops_of
 
 FAST = load_policy("fast")
 ROBOT = load_robot(FAST.card.robot)
 LOW, HIGH = (0.0, -2.0, -10.0, -20.0), (1.0, -0.5, 10.0, 20.0)
-
-
-def ranged():
-    card = dataclasses.replace(FAST.card, input_low=LOW, input_high=HIGH)
-    return Policy(with_card(FAST.content, card), "ranged", "ranged")
+JOINTS = np.tile((0.5, -1.2), (1, 3, 1))
+INSIDE = Measurement(JOINTS, 0 * JOINTS, np.full((1, 3), 0.3), np.zeros((1, 3)))
 
 
 def fallback(policy):
@@ -31,31 +28,25 @@ def fallback(policy):
     return chain, said
 
 
-def measurement(q=(0.5, -1.2), qd=(0.0, 0.0)):
-    return Measurement(
-        np.tile(q, (1, 3, 1)), np.tile(qd, (1, 3, 1)), np.full((1, 3), 0.3), np.zeros((1, 3))
-    )
-
-
 @pytest.mark.parametrize(
-    ("seen", "named"),
+    ("joint", "value", "named"),
     [
-        ({"q": (1.3, -1.2)}, "hip position 1.3"),
-        ({"q": (0.5, 0.2)}, "knee position 0.2"),
-        ({"qd": (-16.0, 0.0)}, "hip velocity -16"),
+        ("q", (1.3, -1.2), "hip position 1.3"),
+        ("q", (0.5, 0.2), "knee position 0.2"),
+        ("qd", (-16.0, 0.0), "hip velocity -16"),
     ],
 )
-def test_inputs_that_stay_beyond_the_training_hand_over_for_good(seen, named):
-    chain, said = fallback(ranged())
-    for _ in range(2):
-        chain.act(measurement(**seen))
-    chain.act(measurement())
+def test_inputs_that_stay_beyond_the_training_hand_over_for_good(joint, value, named):
+    card = dataclasses.replace(FAST.card, input_low=LOW, input_high=HIGH)
+    chain, said = fallback(Policy(with_card(FAST.content, card), "ranged", "ranged"))
+    beyond = dataclasses.replace(INSIDE, **{joint: np.tile(value, (1, 3, 1))})
+    for seen in (beyond, beyond, INSIDE, beyond, beyond):
+        chain.act(seen)
     assert not said
-    for _ in range(3):
-        chain.act(measurement(**seen))
+    chain.act(beyond)
     assert len(said) == 1
     assert named in said[0]
-    chain.act(measurement())
+    chain.act(INSIDE)
     assert chain.internals()["fallback"] == [1.0]
     chain.reset(1)
     assert chain.internals()["fallback"] == [0.0]
@@ -68,20 +59,19 @@ def test_energy_shaping_hops_on_where_a_policy_fails():
     policy.act = lambda seen: next(acts)(seen)
     chain, said = fallback(policy)
     run = rollout(chain, RolloutConfig(ROBOT), np.full((ticks, 1), 0.30), 1000)
-    names = ("height_m", "height_rate_m_s", "foot_clearance_m")
-    height, rate, clearance = (run.data[name][800:, 0] for name in names)
-    hops = measure_hops(height, rate, clearance, 200.0, 0)
+    hops = hops_of(run, 0)
+    apexes = hops.apex[hops.tick > 800]
     assert len(said) == 1
     assert run.data["fallback"][[599, 600], 0].tolist() == [0.0, 1.0]
-    assert len(hops.apex) >= 5
-    assert np.abs(np.median(hops.apex) - 0.30) < 0.03
+    assert len(apexes) >= 5
+    assert np.abs(np.median(apexes) - 0.30) < 0.03
 
 
 def test_a_policy_that_raises_hands_over_by_its_sentence():
     policy = load_policy("fast")
     chain, said = fallback(policy)
     policy.act = lambda _: (_ for _ in ()).throw(UsageError("It gave up."))
-    assert np.isfinite(chain.act(measurement())).all()
+    assert np.isfinite(chain.act(INSIDE)).all()
     assert said == ["energy-shaping took over from fast: It gave up."]
 
 

@@ -1,19 +1,16 @@
 """MPC in the true state: hops are as high as asked, calm, and of one shape on any leg."""
 
-from dataclasses import astuple, fields
-
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from hopping_leg.controllers import RolloutConfig, rollout
-from hopping_leg.controllers.mpc import HopShape, TrueStateMpc, hop_law
+from hopping_leg.controllers.mpc import TrueStateMpc, hop_law
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import UsageError
 from hopping_leg.io import replace_at
-from hopping_leg.robot import GRAVITY, load_robot
+from hopping_leg.robot import load_robot
 from hopping_leg.sim import LegSimulator, leg_simulator
+from hopping_leg.sim.any_leg import draw_leg
 from hopping_leg.sim.mujoco_simulator import MujocoSimulator
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, draw_twin, sample
 from tests.controllers.measurements import hops_of
@@ -86,11 +83,10 @@ def test_legs_that_differ_hop_as_high_each_on_any_number_of_threads(monkeypatch)
     np.testing.assert_array_equal(one.data["height_m"], other.data["height_m"])
 
 
-@pytest.mark.parametrize("seed", [0, 3])
-def test_twins_with_elastic_transmissions_and_every_other_effect_hop_as_high(seed):
-    robot = draw_twin(seed).robot
-    heights = np.array([0.24, 0.31, 0.38])
-    check_apexes(hop(robot, heights), heights)
+@pytest.mark.parametrize("drawn", [draw_twin(0), draw_twin(3), draw_leg(2)])
+def test_legs_of_any_size_and_twins_with_every_effect_hop_as_high(drawn):
+    heights = np.array([0.83, 1.07, 1.31]) * drawn.robot.straight_height
+    check_apexes(hop(drawn.robot, heights), heights)
 
 
 @pytest.mark.parametrize("latency", [0.0035, 0.012])
@@ -98,42 +94,6 @@ def test_commands_under_way_are_planned_with(latency):
     """But their noise is not."""
     robot = replace_at(ROBOT, "reality.latency.command", latency)
     check_apexes(hop(robot, HEIGHTS[::3]), HEIGHTS[::3], most=0.003)
-
-
-SHAPE = np.rec.array([astuple(HopShape())], [(f.name, np.float64) for f in fields(HopShape)])[0]
-NUMBERS = ("flight", "squat", "liftoff", "stop")
-
-
-def shaped(thigh, shank, foot, command, stiffness=1e3):
-    """Return the numbers of a hop."""
-    leg = [("thigh_length", thigh), ("shank_length", shank), ("foot_radius", foot),
-           ("knee_radius", foot), ("gravity", GRAVITY),
-           ("contact_stiffness", stiffness)]  # fmt: skip
-    leg = np.rec.array([tuple(v for _, v in leg)], [(name, np.float64) for name, _ in leg])[0]
-    numbers = np.rec.array(np.zeros(1, hop_law.HOP))[0]
-    hop_law.shape_hop.py_func(leg, SHAPE, command, numbers)
-    return np.array([getattr(numbers, name) for name in NUMBERS])
-
-
-@given(
-    thigh=st.floats(0.8, 1.2),
-    foot=st.floats(0, 0.1),
-    heights=st.tuples(*[st.floats(0.65, 1.6)] * 2),
-)
-def test_lengths_of_a_hop_fit_the_leg_rise_with_the_height_and_grow_with_the_leg(
-    thigh, foot, heights
-):
-    """Lengths here are shares of the stretched leg."""
-    leg = thigh / 2, 1 - thigh / 2, foot
-    low, high = (shaped(*leg, height + foot) for height in sorted(heights))
-    for flight, squat, liftoff, stop in (low, high):
-        assert 0.2 < squat < min(flight, liftoff)
-        assert max(flight, liftoff) < 0.97
-        assert stop >= 0
-    rising = [0, 2]
-    assert (low[rising] <= high[rising] + 1e-12).all()
-    scaled = shaped(*(0.29 * np.array([*leg, min(heights) + foot])), stiffness=1e3 / 0.29)
-    np.testing.assert_allclose(scaled, low * [0.29, 0.29, 0.29, 1.0])
 
 
 def test_it_is_for_simulated_legs_of_the_stepper_alone():

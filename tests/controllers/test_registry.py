@@ -2,11 +2,8 @@
 
 import dataclasses
 
-import onnx
 import pytest
-from onnx import helper
 
-from hopping_leg.controllers.policy import METADATA_KEY
 from hopping_leg.controllers.registry import (
     load_controller,
     load_policy,
@@ -14,25 +11,10 @@ from hopping_leg.controllers.registry import (
     shipped_policies,
 )
 from hopping_leg.errors import UsageError
+from hopping_leg.rl.onnx_export import with_card
 from hopping_leg.robot import DEFAULT_ROBOT, load_robot, shipped_robots
 
 OTHER = next(name for name in shipped_robots() if name.startswith("leg") and name != DEFAULT_ROBOT)
-
-
-@pytest.fixture
-def made_on(tmp_path):
-    """Return a function that writes a policy file of a robot."""
-    policy = load_policy("paper")
-    model = onnx.load_from_string(policy.content)
-
-    def write(robot):
-        path = tmp_path / f"{robot}.onnx"
-        card = dataclasses.replace(policy.card, robot=robot)
-        helper.set_model_props(model, {METADATA_KEY: card.to_json()})
-        path.write_bytes(model.SerializeToString())
-        return str(path)
-
-    return write
 
 
 @pytest.mark.parametrize("name", shipped_policies())
@@ -42,7 +24,14 @@ def test_a_shipped_policy_fits_the_shipped_robot_that_it_was_trained_on(name):
     load_policy(name).check_robot(load_robot(robot), load_policy(name).card.rate, other="refuse")
 
 
-def test_the_first_policy_decides(made_on):
+def test_the_first_policy_decides(tmp_path):
+    policy = load_policy("paper")
+
+    def made_on(robot):
+        card, path = dataclasses.replace(policy.card, robot=robot), tmp_path / f"{robot}.onnx"
+        path.write_bytes(with_card(policy.content, card))
+        return str(path)
+
     first, second = made_on(OTHER), made_on(DEFAULT_ROBOT)
     assert robot_of([first]) == robot_of(["energy-shaping", first, second]) == OTHER
     assert robot_of([second, first]) == DEFAULT_ROBOT

@@ -1,4 +1,3 @@
-import dataclasses
 import math
 
 import numpy as np
@@ -9,11 +8,12 @@ from hopping_leg.controllers.command_schedule import CommandSchedule, check_sche
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.rollout import Perturbation
 from hopping_leg.errors import PhysicsError, UsageError
-from hopping_leg.robot import GRAVITY, command_limits, load_robot
+from hopping_leg.io import replace_at
+from hopping_leg.robot import command_limits, load_robot
 from hopping_leg.sim import NO_NOISE
-from tests.sim.legs import POSTURE, make_legs, without_friction
+from tests.sim.legs import POSTURE, make_legs, with_joints
 
-ROBOT = load_robot("legv2")
+ROBOT, LEG = load_robot("legv2"), load_robot("legv2-paper")
 
 
 class Constant:
@@ -34,10 +34,6 @@ class Constant:
         return {"tick_torque_nm": np.full(self.count, self.torque[1])}
 
 
-def with_shank(**changes):
-    return dataclasses.replace(ROBOT, shank=dataclasses.replace(ROBOT.shank, **changes))
-
-
 def test_a_rollout_records_states_before_and_torques_during_each_tick():
     setup = RolloutConfig(ROBOT, NO_NOISE, threads=1)
     run = rollout(Constant([0.5, -1.0]), setup, np.full((50, 3), 0.3), seed=0)
@@ -52,10 +48,9 @@ def test_a_rollout_records_states_before_and_torques_during_each_tick():
 
 @pytest.mark.parametrize("length", [0.03, 0.15, 0.5])
 def test_legs_of_any_size_start_standing(length):
-    robot = dataclasses.replace(
-        with_shank(length=length, com=length / 3),
-        thigh=dataclasses.replace(ROBOT.thigh, length=length, com=length / 3),
-    )
+    robot = ROBOT
+    for path, value in (("length", length), ("com", length / 3)):
+        robot = replace_at(replace_at(robot, f"shank.{path}", value), f"thigh.{path}", value)
     setup = RolloutConfig(robot, NO_NOISE, threads=1)
     run = rollout(Constant([0, 0]), setup, np.full((2, 1), 0.3), seed=0)
     assert run.data["foot_clearance_m"][0, 0] == pytest.approx(0, abs=1e-9)
@@ -63,8 +58,7 @@ def test_legs_of_any_size_start_standing(length):
 
 
 @pytest.mark.parametrize(
-    ("field", "value"),
-    [("rate", 0.0), ("rate", np.nan), ("timestep", -1.0), ("threads", -1)],
+    ("field", "value"), [("rate", 0.0), ("rate", np.nan), ("timestep", -1.0), ("threads", -1)]
 )
 def test_meaningless_setups_are_refused(field, value):
     with pytest.raises(UsageError, match=field):
@@ -72,13 +66,10 @@ def test_meaningless_setups_are_refused(field, value):
 
 
 def test_an_unstable_simulation_is_an_error():
-    knee = dataclasses.replace(ROBOT.knee, armature=1e-12, friction=0.0, damping=0.0)
-    robot = dataclasses.replace(with_shank(mass=1e-6, inertia=1e-12), knee=knee)
+    robot = with_joints(ROBOT, armature=1e-12, friction=0.0, damping=0.0)
+    robot = replace_at(replace_at(robot, "shank.mass", 1e-6), "shank.inertia", 1e-12)
     with pytest.raises(PhysicsError, match="unstable"):
         rollout(Constant([5, -20]), RolloutConfig(robot, threads=1), np.full((100, 2), 0.3), seed=0)
-
-
-LEG = load_robot("legv2-paper")
 
 
 def test_a_schedule_steps_and_stays():
@@ -104,30 +95,16 @@ def test_a_policy_is_asked_for_what_it_was_trained_for_and_others_for_what_the_l
     assert command_range(load_controller("energy-shaping", LEG), LEG) == command_limits(LEG)
 
 
-def perturbation(legs, force=0.0, ground=0.0, ticks=40):
-    rows = np.ones((ticks, legs.count))
-    torque = np.zeros((ticks, legs.count, 2))
-    return Perturbation((legs.robot,) * legs.count, torque, force * rows, ground * rows)
-
-
-def test_a_push_changes_the_base_speed_by_impulse_over_mass():
-    legs, force = make_legs(without_friction(ROBOT), 1), 20.0
-    legs.place(slice(None), 2.0, np.zeros(2))
-    for tick in range(4):
-        perturbation(legs, force).act(legs, np.zeros(1), tick)
-        legs.step(np.zeros((1, 2)))
-    time = 4 * legs.period
-    assert legs.height_rate == pytest.approx((force / ROBOT.mass - GRAVITY) * time, rel=1e-6)
-
-
 @pytest.mark.parametrize("rise", [0.03, -0.03])
-def test_ground_steps_shift_floor_and_clearance_once_the_foot_is_clear(rise):
+def test_pushes_act_and_ground_steps_shift_floor_and_clearance_once_the_foot_is_clear(rise):
     legs = make_legs(ROBOT, 2)
     legs.stand(slice(None), POSTURE, np.array([0.05, 0.0]))
     height, clearance = legs.height.copy(), legs.foot_clearance()
-    plan, ground = perturbation(legs, ground=rise), np.zeros(2)
+    rows, ground = np.ones((2, 2)), np.zeros(2)
+    plan = Perturbation((ROBOT, ROBOT), np.zeros((2, 2, 2)), 20.0 * rows, rise * rows)
     for tick in range(2):
         ground = plan.act(legs, ground, tick)
         np.testing.assert_allclose(ground, [rise, 0.0])
         np.testing.assert_allclose(legs.height, height - ground)
         np.testing.assert_allclose(legs.foot_clearance(), clearance - ground, atol=1e-12)
+    np.testing.assert_array_equal(legs.memory()["push"], 20.0)

@@ -26,24 +26,24 @@ class Held:
 """
 
 SINGLE = """
-class Leg:
+class Held:
     def __init__(self, robot, rate):
         self.ticks = 0
     def get_control_output(self, {arguments}):
         self.ticks += 1
         return {answer}
 """
+ARGUMENTS = "meas_pos, meas_vel, meas_tau, meas_time"
 
 
-def written(path, text, **parts):
-    for name, value in parts.items():
-        text = text.replace(f"{{{name}}}", value)
-    path.write_text(text)
-    return path
+def written(folder, text, answer, arguments=ARGUMENTS):
+    """Write a class to a file; return what a controller of it is called."""
+    (folder / "mine.py").write_text(text.format(answer=answer, arguments=arguments))
+    return f"{folder / 'mine.py'}:Held"
 
 
-def acted(path, name, count=3):
-    controller = load_controller(f"{path}:{name}", ROBOT)
+def acted(name, count=3, **options):
+    controller = load_controller(name, ROBOT, **options)
     controller.reset(count)
     return controller.act(measurement(count))
 
@@ -60,16 +60,10 @@ def test_example_hops_with_every_leg_on_its_own():
 
 
 def test_batched_class_gets_robot_and_rate_and_may_be_a_modules(tmp_path, monkeypatch):
-    path = written(tmp_path / "mine.py", BATCHED, answer="np.full((self.count, 2), self.rate)")
-    controller = load_controller(f"{path}:Held", ROBOT, rate=100.0)
-    controller.reset(2)
-    np.testing.assert_array_equal(controller.act(measurement(2)), np.full((2, 2), 100.0))
-    assert controller.internals() == {}
+    name = written(tmp_path, BATCHED, "np.full((self.count, 2), self.rate)")
+    np.testing.assert_array_equal(acted(name, rate=100.0), np.full((3, 2), 100.0))
     monkeypatch.syspath_prepend(tmp_path)
-    np.testing.assert_array_equal(acted("mine", "Held"), np.full((3, 2), 200.0))
-
-
-ARGUMENTS = "meas_pos, meas_vel, meas_tau, meas_time"
+    np.testing.assert_array_equal(acted("mine:Held"), np.full((3, 2), 200.0))
 
 
 @pytest.mark.parametrize(
@@ -77,16 +71,13 @@ ARGUMENTS = "meas_pos, meas_vel, meas_tau, meas_time"
     [("meas_tau + meas_pos", "q"), ("[self.desired_height, meas_time]", "command")],
 )
 def test_a_single_leg_gets_joints_time_and_command(tmp_path, answer, expected):
-    path = written(tmp_path / "leg.py", SINGLE, arguments=ARGUMENTS, answer=answer)
     seen = getattr(measurement(3), expected)[:, 0]
     given = np.stack([seen, np.zeros(3)], axis=1) if expected == "command" else seen
-    np.testing.assert_array_equal(acted(path, "Leg"), given)
+    np.testing.assert_array_equal(acted(written(tmp_path, SINGLE, answer)), given)
 
 
 def test_single_legs_share_no_state_and_are_made_anew_by_reset(tmp_path):
-    answer = "[self.ticks, meas_time]"
-    path = written(tmp_path / "leg.py", SINGLE, arguments=ARGUMENTS, answer=answer)
-    controller = load_controller(f"{path}:Leg", ROBOT)
+    controller = load_controller(written(tmp_path, SINGLE, "[self.ticks, meas_time]"), ROBOT)
     for _ in range(2):
         controller.reset(2)
         first, second = (controller.act(measurement(2)) for _ in range(2))
@@ -95,21 +86,19 @@ def test_single_legs_share_no_state_and_are_made_anew_by_reset(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "answer", "says"),
+    ("text", "arguments", "answer", "says"),
     [
-        (None, "np.zeros((self.count, 3))", r"finite torques.*\(3, 3\)"),
-        (None, "np.full((self.count, 2), np.nan)", "finite torques.*nan"),
-        (None, "1 / 0", r"ZeroDivisionError: division by zero \(mine.py, line 9\)"),
-        (ARGUMENTS, "[float('inf'), 0.0]", "finite torques"),
-        ("a, b, c, d, e", "[0, 0]", "missing 1 required positional argument"),
+        (BATCHED, "", "np.zeros((self.count, 3))", r"finite torques.*\(3, 3\)"),
+        (BATCHED, "", "np.full((self.count, 2), np.nan)", "finite torques.*nan"),
+        (BATCHED, "", "1 / 0", r"ZeroDivisionError: division by zero \(mine.py, line 9\)"),
+        (SINGLE, ARGUMENTS, "[float('inf'), 0.0]", "finite torques"),
+        (SINGLE, "a, b, c, d, e", "[0, 0]", "missing 1 required positional argument"),
     ],
 )
-def test_wrong_answers_are_stopped_by_name(tmp_path, arguments, answer, says):
-    text, name = (SINGLE, "Leg") if arguments else (BATCHED, "Held")
-    path = written(tmp_path / "mine.py", text, arguments=arguments or "", answer=answer)
+def test_wrong_answers_are_stopped_by_name(tmp_path, text, arguments, answer, says):
     with pytest.raises(ControllerError, match=says) as caught:
-        acted(path, name)
-    assert f"mine.py:{name}" in str(caught.value)
+        acted(written(tmp_path, text, answer, arguments))
+    assert "mine.py:Held" in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -132,16 +121,15 @@ def test_what_cannot_be_loaded_is_one_sentence(tmp_path, content, name, says):
 
 
 def test_what_is_recorded_of_a_controller_does_not_replace_what_is_of_the_leg(tmp_path):
-    text = BATCHED + "    def internals(self):\n        return {'height_m': 9.0, 'mine': 1.0}\n"
-    path = written(tmp_path / "mine.py", text, answer="np.zeros((self.count, 2))")
-    controller = load_controller(f"{path}:Held", ROBOT)
+    text = BATCHED + "    def internals(self):\n        return dict(height_m=9.0, mine=1.0)\n"
+    controller = load_controller(written(tmp_path, text, "np.zeros((self.count, 2))"), ROBOT)
     run = rollout(controller, RolloutConfig(ROBOT, threads=1), np.full((3, 1), 0.3), seed=0)
     assert run.data["height_m"].max() < 1
     assert (run.data["mine"] == 1).all()
 
 
 def test_an_edited_file_is_another_controller(tmp_path):
-    path = written(tmp_path / "mine.py", BATCHED, answer="np.zeros((self.count, 2))")
-    before, same = (load_controller(f"{path}:Held", ROBOT).digest for _ in range(2))
-    written(path, BATCHED, answer="np.ones((self.count, 2))")
-    assert before == same != load_controller(f"{path}:Held", ROBOT).digest
+    name = written(tmp_path, BATCHED, "np.zeros((self.count, 2))")
+    before, same = (load_controller(name, ROBOT).digest for _ in range(2))
+    written(tmp_path, BATCHED, "np.ones((self.count, 2))")
+    assert before == same != load_controller(name, ROBOT).digest

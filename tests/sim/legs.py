@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 
+from hopping_leg.io import replace_at
 from hopping_leg.robot import DriveMismatch, load_robot
 from hopping_leg.robot.dynamics import kinetic_energy, potential_energy
 from hopping_leg.robot.model_mismatch import ModelMismatch
@@ -44,13 +45,10 @@ def with_joints(robot, rail=None, **changes):
 
 def with_strong_motors(robot):
     """Return a robot whose motors give what they are asked for at any speed."""
-    strong = {"peak_torque": 1e6, "no_load_speed": 1e9}
-    hip, knee = (dataclasses.replace(j.motor, **strong) for j in (robot.hip, robot.knee))
-    return dataclasses.replace(
-        robot,
-        hip=dataclasses.replace(robot.hip, motor=hip),
-        knee=dataclasses.replace(robot.knee, motor=knee),
-    )
+    for joint in ("hip", "knee"):
+        for name, strong in (("peak_torque", 1e6), ("no_load_speed", 1e9)):
+            robot = replace_at(robot, f"{joint}.motor.{name}", strong)
+    return robot
 
 
 def hanging(robot, count=1, q=(0.0, 0.0), **options):

@@ -21,22 +21,8 @@ print(compiled.FOLDER)
 """
 
 
-def use(**environment):
-    """Use the simulator in a process of its own; return it and its cache folder."""
-    done = subprocess.run(
-        [sys.executable, "-c", USE],
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=300,
-    )
-    return done, done.stdout.strip()
-
-
 def compiled_versions():
-    entries = (stepper.step_legs, stepper.read_sensors)
-    return [len(entry.signatures) for entry in entries]
+    return [len(entry.signatures) for entry in (stepper.step_legs, stepper.read_sensors)]
 
 
 def test_no_use_of_the_simulator_compiles_anything_anew():
@@ -63,9 +49,12 @@ def test_no_use_of_the_simulator_compiles_anything_anew():
 def test_a_first_use_says_so_once_even_where_no_home_can_be_written(tmp_path):
     nowhere = tmp_path / "file"
     nowhere.touch()
-    first, folder = use(XDG_CACHE_HOME=str(nowhere), TMPDIR=str(tmp_path))
-    again, same = use(XDG_CACHE_HOME=str(nowhere), TMPDIR=str(tmp_path))
+    env = {**os.environ, "XDG_CACHE_HOME": str(nowhere), "TMPDIR": str(tmp_path)}
+    words, options = [sys.executable, "-c", USE], {"capture_output": True, "text": True}
+    first, again = (
+        subprocess.run(words, env=env, check=True, timeout=300, **options) for _ in range(2)
+    )
     assert first.stderr.count("Compiling the leg's physics") == 1
     assert again.stderr == ""
-    assert folder == same
-    assert folder.startswith(str(tmp_path / "hopping-leg-"))
+    assert first.stdout == again.stdout
+    assert first.stdout.startswith(str(tmp_path / "hopping-leg-"))

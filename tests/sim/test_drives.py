@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from hopping_leg.robot import DriveMismatch, Latency, dynamics, load_robot
-from hopping_leg.sim.stepper import COMMAND
 from tests.sim.legs import (
     POSTURE,
     STEP,
@@ -78,6 +77,10 @@ def test_no_command_overtakes_another_nor_is_one_blended_in_what_is_measured(
 def test_the_torque_speed_line_holds_at_every_physics_step(voltage, sign):
     robot = with_reality(without_friction(CAD), voltage=voltage)
     legs = make_legs(robot, 1, rate=1 / STEP)
+    legs.place(slice(None), 50.0, np.array([0.0, 0.0]))
+    legs.qd[0, 1] = -1.2 * sign * CAD.knee.no_load_speed
+    braking = legs.step(np.array([[0.0, sign * 50.0]]))[0, 1]
+    assert braking == sign * CAD.knee.torque_limit, "the software alone limits it"
     legs.place(slice(None), 50.0, np.array([0.0, -2.0 * sign]))
     stall = CAD.knee.motor.peak_torque * CAD.knee.belt_ratio
     fastest = 0.0
@@ -91,12 +94,6 @@ def test_the_torque_speed_line_holds_at_every_physics_step(voltage, sign):
         if abs(legs.q[0, 1]) > 2.5:
             break
     assert 0.6 * voltage < fastest / CAD.knee.no_load_speed < 1.05 * voltage
-
-
-def test_braking_is_limited_by_the_software_alone():
-    legs = hanging(without_friction(CAD), rate=1 / STEP)
-    legs.qd[0] = [0.0, -1.2 * CAD.knee.no_load_speed]
-    assert legs.step(np.array([[0.0, 50.0]]))[0, 1] == CAD.knee.torque_limit
 
 
 def test_gain_lag_and_limits_shape_the_motor_torque():
@@ -113,21 +110,12 @@ def test_gain_lag_and_limits_shape_the_motor_torque():
     assert given[0][0] < given[1][0] <= 4.0
 
 
-def drive_command(count=1, **columns):
-    """Return a command to the drives' own PD; each column is of hip and knee."""
-    names = ("torque", "stiffness", "position", "damping", "velocity")
-    command = np.zeros((count, COMMAND))
-    for name, values in columns.items():
-        at = 2 * names.index(name)
-        command[:, at : at + 2] = values
-    return command
-
-
 @pytest.mark.parametrize("damping", [0.2, 3.0])
 def test_a_drives_own_pd_is_the_continuous_one(damping):
     """Against the equations of motion, integrated finely; a strong damping stays stable."""
     robot = with_strong_motors(without_friction(CAD))
-    command = drive_command(stiffness=15.0, position=[0.5, -1.0], damping=damping, velocity=0.3)
+    stiffness, position = [15.0, 15.0], [0.5, -1.0]
+    command = np.array([[0.0, 0.0, *stiffness, *position, damping, damping, 0.3, 0.3]])
     errors = []
     for step in (STEP, STEP / 4):
         legs = hanging(robot, timestep=step, q=(0.2, -0.4))

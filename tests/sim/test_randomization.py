@@ -23,12 +23,8 @@ from tests.sim.legs import POSTURE, make_legs, states, with_reality
 LEG = load_robot("legv2")
 
 
-def drawn(count, seed=0, ranges=IDENTIFIABLE_RANGES):
-    return sample(LEG, ranges, count, np.random.default_rng(seed))
-
-
-def late(delay, **effects):
-    return with_reality(latency=Latency(command=delay), **effects)
+def late(delay):
+    return with_reality(latency=Latency(command=delay))
 
 
 @pytest.mark.parametrize("spread", IDENTIFIABLE_RANGES, ids=lambda spread: spread.path)
@@ -93,10 +89,9 @@ def test_whatever_a_leg_is_like_it_can_be_surprised(delay, rubs):
 
 
 def test_what_controllers_believe_may_not_vary():
-    with pytest.raises(UsageError, match=r"thigh\.length"):
-        drawn(2, ranges=[Range("thigh.length", "m", 0.1, 0.2, "test")])
-    with pytest.raises(RobotError, match="time_constant"):
-        drawn(2, ranges=[Range("contact.time_constant", "s", 1e-4, 1e-4, "test")])
+    for path, error in (("thigh.length", UsageError), ("contact.time_constant", RobotError)):
+        with pytest.raises(error, match=path):
+            sample(LEG, [Range(path, "m", 1e-4, 1e-4, "test")], 2, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize("seed", [0, 1, 17])
@@ -104,7 +99,6 @@ def test_a_twin_is_the_same_after_its_file(tmp_path, seed):
     twin, file = draw_twin(seed), tmp_path / "twin.toml"
     twin.save(file)
     assert load_robot(file) == twin.robot
-    assert load_robot(file).digest == twin.robot.digest
     assert draw_twin(seed) == twin
     assert draw_twin(seed + 1).robot != twin.robot
 
@@ -112,9 +106,8 @@ def test_a_twin_is_the_same_after_its_file(tmp_path, seed):
 def test_every_number_lies_in_its_range_and_fills_it():
     twins = [draw_twin(seed) for seed in range(60)]
     for spread in TWIN_RANGES:
-        values = [
-            functools.reduce(getitem, spread.path.split("."), twin.tree)["value"] for twin in twins
-        ]
+        path = spread.path.split(".")
+        values = [functools.reduce(getitem, path, twin.tree)["value"] for twin in twins]
         slack = 1e-5 * abs(spread.high)
         assert min(values) >= spread.low - slack
         assert max(values) <= spread.high + slack

@@ -9,7 +9,7 @@ from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.mujoco_simulator import MujocoSimulator
 from tests.sim.legs import POSTURE, with_joints
 
-PAPER = load_robot("legv2-paper")
+PAPER, CAD = load_robot("legv2-paper"), load_robot("legv2")
 KINDS = {"stepper": LegSimulator, "mujoco": MujocoSimulator}
 
 
@@ -24,9 +24,6 @@ def test_drop_on_the_rail_follows_friction_and_damping(engine):
     speed = force / damping * (1 - np.exp(-damping * 0.3 / PAPER.mass))
     np.testing.assert_allclose(legs.height_rate, -speed, rtol=2e-3)
     np.testing.assert_allclose(legs.q, 0.0, atol=1e-9)
-
-
-CAD = load_robot("legv2")
 
 
 def tight(spec):
@@ -49,10 +46,8 @@ def test_what_became_unstable_stays_so_and_its_neighbour_goes_on(engine):
 
 def test_motor_line_gain_load_friction_and_pushes_are_the_steppers():
     robot = with_joints(CAD, torque_gain=0.8, load_friction=0.2)
-    reference, legs = (
-        MujocoSimulator(robot, 4, threads=1, edit=tight),
-        LegSimulator(robot, 4, threads=1),
-    )
+    reference = MujocoSimulator(robot, 4, threads=1, edit=tight)
+    legs = LegSimulator(robot, 4, threads=1)
     rng = np.random.default_rng(0)
     push = rng.normal(0, 5, 4)
     for one in (reference, legs):

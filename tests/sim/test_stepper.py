@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mujoco import batch
 
 from hopping_leg.robot import JOINTS, DriveMismatch, get_spec, kinematics, load_robot
 from hopping_leg.sim import LegSimulator, leg_physics
@@ -52,72 +51,55 @@ class Reference:
     """Legs in MuJoCo with a tight tolerance, built for these tests alone."""
 
     def __init__(self, robots, timestep, *, fixed_base=False):
+        self.robots, self.legs = robots, []
         self.elastic = robots[0].reality.hip.stiffness is not None
-        models = []
         for robot in robots:
             spec = get_spec(robot, timestep, fixed_base=fixed_base)
             if self.elastic:
                 for name in JOINTS:
                     add_transmission(spec, name, getattr(robot.reality, name))
-            models.append(tight_model(spec))
-        model, self.robots = models[0], robots
-        self.batch = batch.Batch(model, len(robots), 1)
-        for name in batch.MODEL_FIELDS:
-            values = [np.asarray(getattr(model, name)) for model in models if hasattr(model, name)]
-            if values and values[0].dtype.kind == "f" and values[0].size:
-                own = np.stack(values)
-                if (own != own[0]).any():
-                    self.batch.expand(name)[:] = own
-        self.first = 0 if fixed_base else 1
+            model = tight_model(spec)
+            self.legs.append((model, mujoco.MjData(model)))
+        self.rail = [] if fixed_base else [0]
         self.motors = [model.joint(name).dofadr[0] for name in JOINTS]
         self.links = [model.joint(f"{n}_link").dofadr[0] for n in JOINTS] if self.elastic else []
-        self.position, self.speed = self.batch.bind("qpos"), self.batch.bind("qvel")
-        self.ctrl, self.force = self.batch.bind("ctrl"), self.batch.bind("qfrc_applied")
-        self.loss = self.batch.expand("dof_frictionloss")
-        self.belt, self.coulomb, self.load = (
-            np.array([robot.of_joints(name) for robot in robots])
-            for name in ("belt_ratio", "friction", "load_friction")
-        )
-        self.stiffness, self.half = (
-            np.array([robot.reality.of_drives(name) for robot in robots]) * factor
-            for name, factor in (("stiffness", 1.0), ("backlash", 0.5))
-        )
 
     def set_state(self, state, rotor):
         """Take a stepper's state (n, 6), and its rotors' (n, 4)."""
-        if self.first:
-            self.position[:, 0], self.speed[:, 0] = state[:, 0], state[:, 3]
-        for values, link, motor in (
-            (self.position, state[:, 1:3], rotor[:, :2]),
-            (self.speed, state[:, 4:6], rotor[:, 2:]),
-        ):
-            values[:, self.motors] = motor if self.elastic else link
-            if self.elastic:
-                values[:, self.links] = link - motor
+        for (_, data), leg, motor in zip(self.legs, state, rotor, strict=True):
+            for values, at in ((data.qpos, 0), (data.qvel, 1)):
+                rail, link = leg[3 * at], leg[3 * at + 1 : 3 * at + 3]
+                own = motor[2 * at : 2 * at + 2]
+                values[self.rail] = rail
+                values[self.motors] = own if self.elastic else link
+                if self.elastic:
+                    values[self.links] = link - own
 
     def get_state(self):
         """Return state and rotors' state, (n, 10)."""
-        found = []
-        for values in (self.position, self.speed):
-            motor = values[:, self.motors]
-            link = motor + values[:, self.links] if self.elastic else motor
-            rail = values[:, :1] if self.first else np.zeros((len(values), 1))
-            found.append((rail, link, motor))
-        (x, q, t), (v, qd, w) = found
-        return np.concatenate([x, q, v, qd, t, w], axis=1)
+        found = np.zeros((len(self.legs), 10))
+        for (_, data), leg in zip(self.legs, found, strict=True):
+            for values, at in ((data.qpos, 0), (data.qvel, 1)):
+                leg[3 * at] = values[self.rail].sum()
+                leg[6 + 2 * at : 8 + 2 * at] = motor = values[self.motors]
+                leg[3 * at + 1 : 3 * at + 3] = motor + (values[self.links] if self.elastic else 0)
+        return found
 
     def step(self, torque, push, substeps):
         """Hold joint torques and an upward push for some steps."""
-        self.ctrl[:] = torque / self.belt
-        self.loss[:, self.motors] = self.coulomb + self.load * np.abs(torque)
-        if self.first:
-            self.force[:, 0] = push
-        for _ in range(substeps if self.elastic else 1):
-            if self.elastic:
-                twist = self.position[:, self.links]
-                beyond = twist - np.clip(twist, -self.half, self.half)
-                self.force[:, self.links] = -self.stiffness * beyond
-            self.batch.step(nstep=1 if self.elastic else substeps)
+        legs = zip(self.robots, self.legs, torque, push, strict=True)
+        for robot, (model, data), asked, force in legs:
+            data.ctrl[:] = asked / robot.of_joints("belt_ratio")
+            load = robot.of_joints("load_friction") * np.abs(asked)
+            model.dof_frictionloss[self.motors] = robot.of_joints("friction") + load
+            data.qfrc_applied[self.rail] = force
+            stiffness, half = (robot.reality.of_drives(n) for n in ("stiffness", "backlash"))
+            for _ in range(substeps if self.elastic else 1):
+                if self.elastic:
+                    twist = data.qpos[self.links]
+                    beyond = twist - np.clip(twist, -half / 2, half / 2)
+                    data.qfrc_applied[self.links] = -stiffness * beyond
+                mujoco.mj_step(model, data, nstep=1 if self.elastic else substeps)
 
 
 def worst_difference(robots, ticks, timestep=5e-4, *, fixed_base=False, seed=0):
@@ -206,44 +188,30 @@ def test_the_stepper_is_mujoco_for_legs_of_any_kind(name, reality, fixed_base, c
     assert min(seen[part] for part in touching) > 20
 
 
-SEEDS = st.integers(0, 2**32 - 1)
-
-
-def full(m):
-    """Return the matrix of its six numbers."""
-    return np.array([[m[0], m[1], m[2]], [m[1], m[3], m[4]], [m[2], m[4], m[5]]])
-
-
-def random_matrix(rng):
-    """Return six numbers of a positive definite matrix whose scales differ."""
-    root = rng.normal(0, 1, (3, 3)) + 2 * np.eye(3)
-    matrix = root @ root.T * np.outer(*[10 ** rng.uniform(-1, 0, 3)] * 2)
-    matrix = (matrix + matrix.T) / 2
-    return tuple(matrix[np.triu_indices(3)])
-
-
 @compiled
 def acceleration(m, force, friction, rows, count, start):
     """Return the same as the function that is compiled into others; kept between sessions."""
     return leg_physics.constrained_acceleration(m, force, friction, rows, count, start)
 
 
-@given(SEEDS, st.integers(0, leg_physics.ROWS), st.integers(0, 7))
+@given(st.integers(0, 2**32 - 1), st.integers(0, leg_physics.ROWS), st.integers(0, 7))
 @settings(max_examples=300)
 def test_the_acceleration_obeys_gauss_principle(seed, count, sliding):
     """At the minimum, mass times acceleration is force plus what the constraints give."""
     rng = np.random.default_rng(seed)
-    m, force, start = random_matrix(rng), *rng.normal(0, [[100.0], [1000.0]], (2, 3))
+    root = (rng.normal(0, 1, (3, 3)) + 2 * np.eye(3)) * 10 ** rng.uniform(-1, 0, (3, 1))
+    mass, (force, start) = root @ root.T, rng.normal(0, [[100.0], [1000.0]], (2, 3))
     loss = np.where([sliding >> i & 1 for i in range(3)], 10 ** rng.uniform(-2, 2, 3), 0.0)
     stiff, rest = 10 ** rng.uniform(0, 3, 3), rng.normal(0, 100, 3)
     rows = np.zeros((leg_physics.ROWS, 5))
     rows[:count] = rng.normal(0, 1, (count, 5)) * [1, 1, 1, 100, 0]
     rows[:count, 4] = 10 ** rng.uniform(-1, 3, count)
     friction = tuple(map(tuple, (loss, stiff, rest, loss / stiff)))
-    a = acceleration(m, tuple(force), friction, rows, count, tuple(start))
+    numbers = tuple(mass[np.triu_indices(3)])
+    a = acceleration(numbers, tuple(force), friction, rows, count, tuple(start))
     miss = np.minimum(rows[:count, :3] @ a - rows[:count, 3], 0.0)
     given_by_rows = -(rows[:count, 4] * miss) @ rows[:count, :3]
     given_by_friction = np.clip(-stiff * (a - rest), -loss, loss)
-    residual = full(m) @ a - force - given_by_rows - given_by_friction
-    scale = np.abs(full(m)) @ np.abs(a) + np.abs(force) + np.abs(given_by_rows)
+    residual = mass @ a - force - given_by_rows - given_by_friction
+    scale = np.abs(mass) @ np.abs(a) + np.abs(force) + np.abs(given_by_rows)
     assert (np.abs(residual) <= 1e-8 * scale.max()).all()
