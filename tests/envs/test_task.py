@@ -156,7 +156,6 @@ def test_a_restart_shows_nothing_of_the_last_episode():
         {"command_range": (0.4, 0.2)},
         {"reset_distribution": "flying"},
         {"action_torque": (6.0, -1.0)},
-        {"start_length": 0.5},
     ],
 )
 def test_options_without_meaning_are_refused(wrong):

@@ -10,13 +10,12 @@ one keeps body and knee off the ground.
 """
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.envs.paper_reward import action_jerk, position_term
+from hopping_leg.envs.paper_reward import jerk_term, position_term
 from hopping_leg.envs.rewards import LastingTerm, Reward, RewardTerm, Transition, sum_of_joints
 from hopping_leg.robot import Robot, kinematics
 
@@ -66,6 +65,21 @@ class ApexRewardConfig:
 def apex_reward(robot: Robot, config: ApexRewardConfig, rate: float) -> Reward:
     """Return the reward that judges ticks by predicted and reached apexes; rate is in Hz."""
     c = config
+
+    def bounded_energy_gain(t: Transition) -> Array:
+        most: float | Array = _FASTEST_SQUARED
+        if c.energy_beyond > 0:
+            most = most * np.exp(-np.maximum(ballistic_apex(t) - t.command, 0.0) / c.energy_beyond)
+        gain: Array = np.minimum(np.square(t.rate), most)
+        return gain
+
+    def ground_closeness(t: Transition) -> Array:
+        base = kinematics.base_clearance(robot, t.height)
+        knee = kinematics.knee_clearance(robot, t.height, t.q)
+        inside = np.maximum(1 - base / _BASE_MARGIN, 0.0) + np.maximum(1 - knee / _KNEE_MARGIN, 0.0)
+        closeness: Array = inside + TOUCH * (np.minimum(base, knee) < _TOUCH_MARGIN)
+        return closeness
+
     return Reward(
         (
             RewardTerm("apex", c.apex, ApexEvent(c.width, 1 / rate)),
@@ -73,13 +87,19 @@ def apex_reward(robot: Robot, config: ApexRewardConfig, rate: float) -> Reward:
             RewardTerm(
                 "energy",
                 lambda share: c.energy * max(0.0, 1 - share / _ENERGY_UNTIL),
-                partial(bounded_energy_gain, beyond=c.energy_beyond),
+                bounded_energy_gain,
             ),
-            RewardTerm("jerk", -c.jerk, action_jerk),
-            RewardTerm("effort", -c.effort, flight_effort),
+            jerk_term(c.jerk),
+            RewardTerm(
+                "effort", -c.effort, lambda t: sum_of_joints(np.square(t.action)) * t.flying
+            ),
             position_term(robot, c.position),
-            RewardTerm("velocity", -c.velocity, joint_overspeed),
-            RewardTerm("clearance", -c.clearance, partial(ground_closeness, robot=robot)),
+            RewardTerm(
+                "velocity",
+                -c.velocity,
+                lambda t: sum_of_joints(np.maximum(np.abs(t.qd) - _SPEED, 0.0)),
+            ),
+            RewardTerm("clearance", -c.clearance, ground_closeness),
         ),
         c.scale,
     )
@@ -143,31 +163,3 @@ def predicted_apex_accuracy(t: Transition) -> Array:
     narrow, wide = _PREDICTION_WIDTHS
     kernel = np.exp(error / -narrow) + 0.5 * np.exp(error / -wide)
     return np.abs(t.rate) * kernel * t.flying
-
-
-def bounded_energy_gain(t: Transition, beyond: float) -> Array:
-    """Return base velocity squared, bounded, and less if the hop would be too high, m2/s2."""
-    most: float | Array = _FASTEST_SQUARED
-    if beyond > 0:
-        most = most * np.exp(-np.maximum(ballistic_apex(t) - t.command, 0.0) / beyond)
-    gain: Array = np.minimum(np.square(t.rate), most)
-    return gain
-
-
-def flight_effort(t: Transition) -> Array:
-    """Return the sum of the actions' squares in flight, 0 on the ground."""
-    return sum_of_joints(np.square(t.action)) * t.flying
-
-
-def joint_overspeed(t: Transition) -> Array:
-    """Return joint speed beyond what a hop needs, summed over the joints, rad/s."""
-    return sum_of_joints(np.maximum(np.abs(t.qd) - _SPEED, 0.0))
-
-
-def ground_closeness(t: Transition, robot: Robot) -> Array:
-    """Return how far base and knee are inside their margins to the ground, more if they touch."""
-    base = kinematics.base_clearance(robot, t.height)
-    knee = kinematics.knee_clearance(robot, t.height, t.q)
-    inside = np.maximum(1 - base / _BASE_MARGIN, 0.0) + np.maximum(1 - knee / _KNEE_MARGIN, 0.0)
-    closeness: Array = inside + TOUCH * (np.minimum(base, knee) < _TOUCH_MARGIN)
-    return closeness

@@ -84,15 +84,6 @@ class _TaskView:
         return task.reset(None, command) if again else task.reseed(self.np_random, command)
 
 
-def _numbers(action: Any) -> Array:  # noqa: ANN401
-    """Return an action of any kind as an array; a tensor may still carry its gradient."""
-    try:
-        kept = action.detach().cpu() if hasattr(action, "detach") else action
-        return np.asarray(kept, np.float64)
-    except (TypeError, ValueError) as error:
-        raise UsageError(f"An action must be an array of numbers, not {action!r:.60}.") from error
-
-
 def _asked(options: dict[str, Any] | None, count: int) -> Array | None:
     """Return the commands that a reset is asked for, m, (count,), None to draw them."""
     for name in options or {}:
@@ -100,16 +91,13 @@ def _asked(options: dict[str, Any] | None, count: int) -> Array | None:
             raise UsageError(unknown_name("option of reset", str(name), ["command"]))
     if (command := (options or {}).get("command")) is None:
         return None
-    try:
-        heights = np.broadcast_to(np.asarray(command, np.float64), count)
-    except (TypeError, ValueError):
-        heights = np.zeros(1)
-    if not ((heights > 0) & (heights < np.inf)).all():
+    heights = np.asarray(command, np.float64)
+    if heights.shape not in ((), (count,)) or not ((heights > 0) & (heights < np.inf)).all():
         raise UsageError(
             f"'command' must be a positive height in m, one for all or for each of {count} legs,"
             f" not {command!r:.60}."
         )
-    return heights
+    return np.broadcast_to(heights, count)
 
 
 class HoppingEnv(_TaskView, gymnasium.Env[Array32, Array32]):
@@ -151,7 +139,7 @@ class HoppingEnv(_TaskView, gymnasium.Env[Array32, Array32]):
 
     def step(self, action: Array32) -> tuple[Array32, float, bool, bool, dict[str, Any]]:
         """Act for one control period; UsageError refuses an action that is not two numbers."""
-        step = self.task.step(_numbers(action)[None])
+        step = self.task.step(np.asarray(action)[None])
         info: dict[str, Any] = {
             "base_height": step.height.item(),
             "command": step.command.item(),
@@ -200,19 +188,18 @@ class HoppingVectorEnv(_TaskView, gymnasium.vector.VectorEnv[Array32, Array32, A
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         max_episode_steps: int | None = None,
     ) -> None:
-        modes = {mode.value: mode for mode in (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP)}
-        named = getattr(autoreset_mode, "value", autoreset_mode)
-        if named not in modes:
-            raise UsageError(unknown_name("autoreset mode", str(named), modes))
+        mode = AutoresetMode(autoreset_mode)
+        if mode is AutoresetMode.DISABLED:
+            raise UsageError("The autoreset mode must be NextStep or SameStep, not Disabled.")
         if max_episode_steps is not None:
             longest = min(options.episode, max_episode_steps / options.rate)
             options = dataclasses.replace(options, episode=longest)
-        same_step = modes[named] is AutoresetMode.SAME_STEP
         self.num_envs = num_envs
         self.single_observation_space, self.single_action_space = self._open(
-            robot, num_envs, options, reward, render_mode, threads, autoreset=same_step
-        )
-        self.metadata["autoreset_mode"] = modes[named]
+            robot, num_envs, options, reward, render_mode, threads,
+            autoreset=mode is AutoresetMode.SAME_STEP,
+        )  # fmt: skip
+        self.metadata["autoreset_mode"] = mode
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._ended = np.zeros(num_envs, np.bool_)  # legs that wait for their next episode
@@ -238,7 +225,7 @@ class HoppingVectorEnv(_TaskView, gymnasium.vector.VectorEnv[Array32, Array32, A
         Raises:
             UsageError: Actions are not finite or of another shape.
         """
-        step = self.task.step(_numbers(actions))
+        step = self.task.step(np.asarray(actions))
         seen, reward = step.observation, step.reward
         terminated, truncated = step.terminated.copy(), step.truncated.copy()
         new = self._ended

@@ -1,51 +1,61 @@
 """In which states episodes begin."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from hopping_leg import errors
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.envs import task_config
+from hopping_leg.controllers import robot_numbers
+from hopping_leg.envs.task_config import ResetDistribution
+from hopping_leg.errors import RobotError
 from hopping_leg.robot import Robot, kinematics
 from hopping_leg.robot.kinematics import LegGeometry
 
+_PAPER_LENGTH = 0.15 + 0.14
+"""Stretched length of the paper's leg, m, for which the following lengths, m, are; they grow with
+the leg. A leg's length is that from the hip to the foot's centre."""
+_STANDING_LENGTH = 0.2  # foot below the hip
+_DROP_LENGTH, _DROP_OFFSET = (0.15, 0.25), 0.02
+_DROP_CLEARANCE = 0.1  # at most, under the foot
+_NEAR_APEX = (-0.06, 0.03)
+"""Where most starts ``hop`` begin, relative to the commanded apex."""
+
 _STANDING_SHARE = 0.3  # of the starts ``hop``
 
-_NEAR_APEX = (-0.06, 0.03)
-"""Where the other starts ``hop`` begin, relative to the commanded apex, m."""
+
+def standing_length(robot: Robot) -> float:
+    """Return the leg length of a standing start, m."""
+    return _STANDING_LENGTH * robot_numbers.leg_length(robot) / _PAPER_LENGTH
 
 
 class InitialStates:
     """Draws initial states: standing, or dropped in a random posture.
 
-    ``geometry`` is the legs', ``scale`` that of the lengths of ``config`` for each, (n,).
+    ``believed`` is what is told of each leg, ``geometry`` the legs'.
 
     Raises:
-        RobotError: The robot is no leg.
-        UsageError: A start asks for a leg length that the robot does not reach.
+        RobotError: The robot is no leg, or cannot fold to the length in which it stands.
     """
 
     def __init__(
         self,
         robot: Robot,
-        config: task_config.TaskConfig,
+        kind: ResetDistribution,
+        believed: Sequence[Robot],
         geometry: kinematics.Geometry,
-        scale: Array,
     ) -> None:
         robot.require_leg()
-        self.robot, self.config = robot, config
-        self._geometry, self._scale = geometry, scale
-        lengths = (config.start_length, *config.drop_length)
-        self._standing = kinematics.joint_angles(robot, np.array([lengths[0], 0.0]))
-        reach = robot.thigh.length + robot.shank.length
-        if np.isnan(self._standing).any() or not all(0 < length < reach for length in lengths):
-            raise errors.UsageError(
-                f"The starting leg lengths {lengths} m do not all lie within reach of {robot.name};"
-                f" take lengths below {reach:g} m."
-            )
+        self._robot, self._kind, self._geometry = robot, kind, geometry
+        lengths = np.array([robot_numbers.leg_length(one) for one in believed])
+        self._scale = lengths / _PAPER_LENGTH
+        length = standing_length(robot)
+        self._standing = kinematics.joint_angles(robot, np.array([length, 0.0]))
+        if np.isnan(self._standing).any():
+            raise RobotError(f"{robot.name} cannot stand: its leg does not fold to {length:g} m.")
 
     def draw(self, rows: IntArray, command: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """Draw base heights, m, (k,), and joint angles, rad, (k, 2), for desired heights, m."""
-        count, kind = len(command), self.config.reset_distribution
+        count, kind = len(command), self._kind
         leg, scale = self._geometry, self._scale[rows]
         if isinstance(leg, LegGeometry):
             leg = leg.rows(rows)
@@ -66,9 +76,8 @@ class InitialStates:
     def _drop(
         self, leg: kinematics.Geometry, scale: Array, count: int, rng: np.random.Generator
     ) -> tuple[Array, Array]:
-        config = self.config
-        length = scale * rng.uniform(*config.drop_length, count)
-        offset = scale * rng.uniform(-config.drop_offset, config.drop_offset, count)
+        length = scale * rng.uniform(*_DROP_LENGTH, count)
+        offset = scale * rng.uniform(-_DROP_OFFSET, _DROP_OFFSET, count)
         q = kinematics.joint_angles(leg, np.stack([length, offset], axis=-1))
-        q = np.clip(q, self.robot.of_joints("lower"), self.robot.of_joints("upper"))
-        return q, scale * rng.uniform(0.0, config.drop_clearance, count)
+        q = np.clip(q, self._robot.of_joints("lower"), self._robot.of_joints("upper"))
+        return q, scale * rng.uniform(0.0, _DROP_CLEARANCE, count)

@@ -17,18 +17,15 @@ from hopping_leg.arrays import Array, Array32, IntArray
 from hopping_leg.controllers import observation_history
 from hopping_leg.envs.task_config import TaskConfig
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim import SAMPLES, Channel, Simulator
+from hopping_leg.sim import SAMPLES, Channel
 from hopping_leg.sim.compiled import compiled
 
 SIZE = 15
 """Entries of the paper's observation."""
 
-PRIVILEGED = 10
-"""Entries of the true state, where all legs are the same."""
-
 _LEAST_SPAN = 0.05  # half the command range at least, m, so that a single command has a scale
+_VELOCITY = 10.0  # joint velocity that is shown as 1, rad/s
 _LATE = 0.025  # age of a sample that is shown as 1, s
-_CLEARANCE_GAIN = 10.0  # scale of clearances, 1/m
 
 
 class Scaling(NamedTuple):
@@ -145,8 +142,7 @@ def sample_scaling(robot: Robot, config: TaskConfig) -> Scaling:
     low, high = config.command_bounds
     half = max((high - low) / 2, _LEAST_SPAN)
     offset = np.concatenate([(lower + upper) / 2, [0.0, 0.0, (low + high) / 2]])
-    velocity = config.velocity_scale
-    span = np.concatenate([(upper - lower) / 2, [velocity, velocity, half]])
+    span = np.concatenate([(upper - lower) / 2, [_VELOCITY, _VELOCITY, half]])
     return Scaling(offset, 1 / span)
 
 
@@ -181,20 +177,3 @@ def make_observation(
     ]
     scaling = Scaling(*(np.concatenate(column) for column in zip(*columns, strict=True)))
     return HistoryObservation(history, scaling, torque, count)
-
-
-def privileged_observation(legs: Simulator, command: Array, sample: Scaling, out: Array32) -> None:
-    """Write the normalised true state.
-
-    Base height and rate, q (2), qd (2), command, clearance of foot, knee and base, to ``out``, (n,
-    ``PRIVILEGED``); the base's height is scaled like the command.
-    """
-    offset, gain = sample
-    out[:, 0] = (legs.height - offset[4]) * gain[4]
-    out[:, 1] = legs.height_rate
-    out[:, 2:4] = (legs.q - offset[:2]) * gain[:2]
-    out[:, 4:6] = legs.qd * gain[2:4]
-    out[:, 6] = (command - offset[4]) * gain[4]
-    out[:, 7] = legs.foot_clearance() * _CLEARANCE_GAIN
-    out[:, 8] = legs.knee_clearance() * _CLEARANCE_GAIN
-    out[:, 9] = legs.base_clearance() * _CLEARANCE_GAIN

@@ -1,12 +1,12 @@
 """The paper's reward (Sec. II-C, "Reward"): R = w1 Ge - w2 Ph - w3 Pj - w4 Pjp - w5 Pjv."""
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Literal
 
 import numpy as np
 
 from hopping_leg.arrays import Array
+from hopping_leg.envs.initial_states import standing_length
 from hopping_leg.envs.rewards import Reward, RewardTerm, Transition, sum_of_joints
 from hopping_leg.robot.parameters import Robot
 
@@ -34,59 +34,52 @@ class PaperRewardConfig:
     """w5, weight of the joint velocity penalty Pjv."""
     barrier: Barrier = "step"
     """Ph above the desired height: e^(x - xd), or as printed 1 - e^(x - xd)."""
-    rest_length: float = 0.2
-    """Leg length of the initial standing position, m; x_o is the base height standing on it."""
 
 
 def paper_reward(robot: Robot, config: PaperRewardConfig = PaperRewardConfig()) -> Reward:
-    """Return the paper's reward for a leg, whose joint limits and motors count."""
-    c, rest = config, np.array(config.rest_length + robot.foot.radius)
-    barrier = partial(height_barrier, printed=c.barrier == "printed")
-    speed = robot.of_joints("no_load_speed")[None]
+    """Return the paper's reward for a leg, whose joint limits and motors count.
+
+    x_o is the base's height where it stands at the start.
+    """
+    c, rest = config, np.array(standing_length(robot) + robot.foot.radius)
+    fastest = np.square(robot.of_joints("no_load_speed")[None])
+
+    def energy_gain(t: Transition) -> Array:  # Ge, m2/s2 + m2
+        gain: Array = np.square(t.rate) + np.square(t.height - rest)
+        return gain
+
+    def height_barrier(t: Transition) -> Array:  # Ph: 0 below the desired height
+        excess = t.height - t.command
+        growth = np.exp(excess)
+        growth = 1 - growth if c.barrier == "printed" else growth
+        barrier: Array = np.heaviside(excess, _ONE) * growth
+        return barrier
+
+    def joint_velocity_penalty(t: Transition) -> Array:  # Pjv, where a joint is faster, rad2/s2
+        return sum_of_joints(np.maximum(np.square(t.qd) - fastest, _ZERO))
+
     return Reward(
         (
-            RewardTerm("energy", c.energy, partial(energy_gain, rest=rest)),
-            RewardTerm("height", -c.height, barrier),
-            RewardTerm("jerk", -c.jerk, action_jerk),
+            RewardTerm("energy", c.energy, energy_gain),
+            RewardTerm("height", -c.height, height_barrier),
+            jerk_term(c.jerk),
             position_term(robot, c.position),
-            RewardTerm(
-                "velocity", -c.velocity, partial(joint_velocity_penalty, limit_squared=speed**2)
-            ),
+            RewardTerm("velocity", -c.velocity, joint_velocity_penalty),
         )
     )
 
 
+def jerk_term(weight: float) -> RewardTerm:
+    """Return Pj, the penalty on the squared change of the action."""
+    return RewardTerm("jerk", -weight, lambda t: sum_of_joints(np.square(t.action - t.last_action)))
+
+
 def position_term(robot: Robot, weight: float) -> RewardTerm:
-    """Return the penalty on a robot's joints at their limits."""
+    """Return Pjp, the penalty on joints: 1 beyond their limits, and rising to it inside."""
     lower, upper = robot.of_joints("lower")[None], robot.of_joints("upper")[None]
-    penalty = partial(joint_position_penalty, lower=lower, upper=upper)
-    return RewardTerm("position", -weight, penalty)
 
+    def joint_position_penalty(t: Transition) -> Array:
+        near = np.exp(_SHARPNESS * (lower - t.q)) + np.exp(_SHARPNESS * (t.q - upper))
+        return sum_of_joints(np.minimum(near, _ONE))
 
-def energy_gain(t: Transition, rest: Array) -> Array:
-    """Return Ge: base velocity and height above its rest, m, both squared, m2/s2 + m2."""
-    return np.square(t.rate) + np.square(t.height - rest)
-
-
-def height_barrier(t: Transition, printed: bool) -> Array:
-    """Return Ph: grows with the base's height above the desired one, 0 below."""
-    excess = t.height - t.command
-    growth = np.exp(excess)
-    barrier: Array = np.heaviside(excess, _ONE) * (1 - growth if printed else growth)
-    return barrier
-
-
-def action_jerk(t: Transition) -> Array:
-    """Return Pj: the squared change of the action."""
-    return sum_of_joints(np.square(t.action - t.last_action))
-
-
-def joint_position_penalty(t: Transition, lower: Array, upper: Array) -> Array:
-    """Return Pjp: 1 for each joint beyond its limits, rad, (1, 2), and rising to it inside."""
-    near = np.exp(_SHARPNESS * (lower - t.q)) + np.exp(_SHARPNESS * (t.q - upper))
-    return sum_of_joints(np.minimum(near, _ONE))
-
-
-def joint_velocity_penalty(t: Transition, limit_squared: Array) -> Array:
-    """Return Pjv: squared joint velocity less its limit's square, where it is faster, rad2/s2."""
-    return sum_of_joints(np.maximum(np.square(t.qd) - limit_squared, _ZERO))
+    return RewardTerm("position", -weight, joint_position_penalty)

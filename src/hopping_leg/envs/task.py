@@ -15,18 +15,18 @@ from hopping_leg.controllers import robot_numbers
 from hopping_leg.controllers.observation_history import AnyLeg
 from hopping_leg.envs import rewards, task_config
 from hopping_leg.envs.initial_states import InitialStates
-from hopping_leg.envs.observation import (
-    PRIVILEGED,
-    make_observation,
-    privileged_observation,
-    sample_scaling,
-)
+from hopping_leg.envs.observation import make_observation, sample_scaling
 from hopping_leg.robot import Robot
 from hopping_leg.sim import LegSimulator, Measurement, Plant, randomization
 from hopping_leg.sim.compiled import compiled
 
 _RECENT = 500
 """Hops that count as the latest."""
+
+_PRIVILEGED = 10
+"""Entries of the true state, where all legs are the same."""
+
+_CLEARANCE_GAIN = 10.0  # scale of clearances in there, 1/m
 
 
 @dataclass(frozen=True)
@@ -135,9 +135,9 @@ class HoppingTask:
         if options.observation == AnyLeg.name:
             self.full_torque = np.array(list(map(robot_numbers.full_torque, self.believed)))
         self.observation = make_observation(robot, options, count, self.believed)
-        length = np.array([robot_numbers.leg_length(one) for one in self.believed])
-        scale = length / robot_numbers.leg_length(robot)
-        self._initial_states = InitialStates(robot, options, self.legs.geometry, scale)
+        self._initial_states = InitialStates(
+            robot, options.reset_distribution, self.believed, self.legs.geometry
+        )
 
     def _randomize(self, seed: int) -> None:
         """Let every leg go on with numbers of its own, the same ones for the same seed."""
@@ -157,7 +157,7 @@ class HoppingTask:
     @property
     def privileged_size(self) -> int:
         """Entries of the true state that a critic may see."""
-        return PRIVILEGED + len(self.options.randomised)
+        return _PRIVILEGED + len(self.options.randomised)
 
     def reseed(self, rng: np.random.Generator, command: Array | None = None) -> Array32:
         """Take all randomness from another source and begin anew, see ``reset``."""
@@ -228,12 +228,24 @@ class HoppingTask:
         return error
 
     def privileged(self) -> Array32:
-        """Return true states, and where the legs' numbers lie in their ranges, (n, size)."""
-        result = np.empty((self.count, self.privileged_size), np.float32)
-        privileged_observation(self.legs, self.command, self._scaling, out=result[:, :PRIVILEGED])
-        if self._numbers.size:
-            result[:, PRIVILEGED:] = self._numbers
-        return result
+        """Return normalised true states, (n, size).
+
+        Base height and rate, q (2), qd (2), command, clearance of foot, knee and base, and where
+        the legs' numbers lie in their ranges; the base's height is scaled like the command.
+        """
+        legs, (offset, gain) = self.legs, self._scaling
+        out = np.empty((self.count, self.privileged_size), np.float32)
+        out[:, 0] = (legs.height - offset[4]) * gain[4]
+        out[:, 1] = legs.height_rate
+        out[:, 2:4] = (legs.q - offset[:2]) * gain[:2]
+        out[:, 4:6] = legs.qd * gain[2:4]
+        out[:, 6] = (self.command - offset[4]) * gain[4]
+        for column, clearance in enumerate(
+            (legs.foot_clearance, legs.knee_clearance, legs.base_clearance), start=7
+        ):
+            out[:, column] = clearance() * _CLEARANCE_GAIN
+        out[:, _PRIVILEGED:] = self._numbers
+        return out
 
     def state(self) -> dict[str, Any]:
         """Return everything needed to go on exactly from here, as arrays and plain values."""

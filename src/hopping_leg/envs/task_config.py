@@ -32,14 +32,6 @@ class TaskConfig:
     reset_distribution: ResetDistribution = "standing"
     """Episodes begin standing, with a drop in a random posture, either with equal chance, or mostly
     near the apex of the commanded hop and else standing in a random posture."""
-    start_length: float = 0.2
-    """Leg length of the standing start, m, hip axis to the foot's centre, foot below the hip."""
-    drop_length: tuple[float, float] = (0.15, 0.25)
-    """Leg lengths of a drop, m."""
-    drop_offset: float = 0.02
-    """Largest forward or backward offset of the foot at a drop, m."""
-    drop_clearance: float = 0.1
-    """Largest gap between foot and ground at a drop, m."""
     episode: float = 5.0
     """Length of an episode, s."""
     random_episode_start: bool = False
@@ -50,8 +42,6 @@ class TaskConfig:
     """Gap between ground and base or knee below which an episode terminates, m; none never does."""
     fall_penalty: float = 0.0
     """Reward lost by that end: without it a leg with little to win learns to fall."""
-    velocity_scale: float = 10.0
-    """Joint velocity that the observation shows as 1, rad/s."""
     rate: float = CONTROL_RATE
     """Control rate, Hz."""
     timestep: float = TIMESTEP
@@ -68,16 +58,13 @@ class TaskConfig:
             raise UsageError(
                 f"Commands must be positive heights in m, not {self.commands}; e.g. 0.25 0.30 0.35."
             )
-        for name in ("command_range", "command_resampling_time", "drop_length"):
+        for name in ("command_range", "command_resampling_time"):
             pair = getattr(self, name)
             if pair is not None and not 0 < pair[0] <= pair[1] < np.inf:
                 raise UsageError(
                     f"'{name}' is {pair} but must be two positive numbers, the smaller first."
                 )
-        for name in (
-            "action_torque", "start_length", "episode", "velocity_scale", "rate",
-            "timestep",
-        ):  # fmt: skip
+        for name in ("action_torque", "episode", "rate", "timestep"):
             value = getattr(self, name)
             if not all(0 < v < np.inf for v in np.atleast_1d(value)):
                 raise UsageError(f"'{name}' is {value} but must be positive and finite.")

@@ -118,19 +118,18 @@ class Recipe:
         if self.reward is None:
             return envs.Reward(self.reward_terms)
         if isinstance(self.reward, envs.PaperRewardConfig):
-            length = self.task.start_length
-            reward = envs.paper_reward(robot, dataclasses.replace(self.reward, rest_length=length))
+            reward = envs.paper_reward(robot, self.reward)
         else:
             reward = envs.apex_reward(robot, self.reward, self.task.rate)
         return reward.with_terms(*self.reward_terms) if self.reward_terms else reward
 
     def fit(self, robot: Robot) -> Self:
-        """Return the recipe with heights, lengths and torques scaled to a robot.
+        """Return the recipe with heights and torques scaled to a robot.
 
-        Heights and lengths grow with the straight leg, rounded to 5 mm; torques with mass times
-        length, rounded to 0.5 N m and within the motors' limit. A leg of the paper's height keeps
-        the recipe. Heights that the recipe gives as they are stay so; evaluations lie in their
-        inner four fifths.
+        Heights grow with the straight leg, rounded to 5 mm; torques with mass times length, rounded
+        to 0.5 N m and within the motors' limit. A leg of the paper's height keeps the recipe.
+        Heights that the recipe gives as they are stay so; evaluations lie in their inner four
+        fifths.
 
         Raises:
             UsageError: Those heights are no range of heights.
@@ -163,8 +162,6 @@ class Recipe:
             task,
             commands=tuple(_round(c * ratio) for c in task.commands),
             command_range=task.command_range and (_round(low * ratio), _round(high * ratio)),
-            start_length=_round(task.start_length * ratio),
-            drop_length=(_round(task.drop_length[0] * ratio), _round(task.drop_length[1] * ratio)),
             action_torque=(hip, knee),
         )
         heights = tuple(_round(c * ratio) for c in self.selection.eval_commands)
