@@ -4,7 +4,6 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from moteus.fdcanusb_device import _append_checksum, _compute_crc8
-from studies.fault_campaign.wire_log import WireLog
 
 from hopping_leg.deploy.frames import Frame, crc8
 from hopping_leg.emulator.bus import ReplyWriter
@@ -55,18 +54,6 @@ def test_no_payload_breaks_a_drive(bench, data):
     bench.wait(5e-4)
     assert len(bench.robot.reply_queue.take(bench.robot.time)) <= 2
     assert np.isfinite(bench.robot.leg.q).all()
-
-
-@pytest.mark.parametrize(("resolution", "told"), [(moteus.INT16, 65.0), (moteus.F32, 65.04)])
-def test_an_answer_is_logged_as_it_travels_if_it_tells_the_state(resolution, told):
-    bench = Bench()
-    bench.robot.observer = log = WireLog()
-    bench.robot.drives[0].disturbances.temperature = 35.04
-    bench.read(R.POSITION, R.TEMPERATURE)
-    assert not list(log.answers())
-    bench.read(R.MODE, R.FAULT, R.VOLTAGE, R.TEMPERATURE, resolution=resolution)
-    (answer,) = log.answers()
-    assert answer.temperature == pytest.approx(told, abs=1e-5)
 
 
 SEND = b"can send 8001 1100 bF"

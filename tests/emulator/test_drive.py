@@ -127,18 +127,14 @@ def test_heat_derates_then_faults(powered):
     assert (powered.modes()[0], powered.faults()[0]) == (1, FaultCode.OVER_TEMPERATURE)
 
 
-@pytest.mark.parametrize(
-    ("volts", "fault"), [(47, FaultCode.OVER_VOLTAGE), (3, FaultCode.UNDER_VOLTAGE)]
-)
-def test_voltage_faults_only_where_power_is_on(bench, volts, fault):
+def test_voltage_faults_only_where_power_is_on(bench):
     for drive in bench.robot.drives:
-        drive.disturbances.voltage = volts - drive.nominal_voltage
+        drive.disturbances.voltage = 47 - drive.nominal_voltage
     bench.wait(0.01)
     assert bench.modes() == [0, 0]
     bench.push(0.0, seconds=0.01)
-    assert bench.modes() == [1, 1]
-    assert bench.faults() == [fault, fault]
-    assert bench.read(R.VOLTAGE) == pytest.approx(volts)
+    assert bench.faults() == [FaultCode.OVER_VOLTAGE] * 2
+    assert bench.read(R.VOLTAGE) == pytest.approx(47)
 
 
 def test_a_mode_write_resets_the_command(powered):

@@ -14,6 +14,7 @@ from hopping_leg.deploy.drive_link import joint_transforms
 from hopping_leg.envs import HoppingEnv
 from hopping_leg.errors import RobotError
 from hopping_leg.robot import (
+    JOINTS,
     NO_MISMATCH,
     build_model,
     load_robot,
@@ -65,16 +66,11 @@ def test_a_pendulum_swings_freely_but_cannot_hop():
 
 
 def test_a_leg_that_states_no_stops_has_leg_v2s_and_a_pendulum_none_within_a_turn():
-    for name in shipped_robots():
-        robot = load_robot(name)
-        free = {
-            joint: dataclasses.replace(
-                getattr(robot, joint), stop_lower=math.nan, stop_upper=math.nan
-            )
-            for joint in ("hip", "knee")
-        }
-        bare = dataclasses.replace(robot, **free)
-        for key in ("stop_lower", "stop_upper"):
+    for robot in map(load_robot, shipped_robots()):
+        free = {"stop_lower": math.nan, "stop_upper": math.nan}
+        joints = {name: dataclasses.replace(getattr(robot, name), **free) for name in JOINTS}
+        bare = dataclasses.replace(robot, **joints)
+        for key in free:
             np.testing.assert_allclose(bare.of_joints(key), robot.of_joints(key), atol=0.02)
 
 
@@ -162,12 +158,30 @@ def test_a_part_may_be_left_out_and_the_wiring_is_no_part_of_the_physics(tmp_pat
         ("hardware.knee.id", 1, "1", "both 1"),
         ("hardware.hip.id", 1.5, "1", "whole number"),
         ("hardware.voltage_low", 50, "V", "voltage_high"),
+        ("hardware.watchdog", 0.11, "s", "default_timeout_s"),
+        ("hardware.watchdog", 1e-4, "s", "default_timeout_s"),
+        ("hardware.temperature_limit", 76.0, "deg C", "trip at 75"),
+        ("hardware.voltage_high", 46.5, "V", "trip at 46"),
+        ("hardware.knee.max_current", 101.0, "A", "r4"),
+        ("hip.motor.peak_torque", 48.0, "N m", "max_current"),
+        ("knee.motor.no_load_speed", 78.0, "rad/s", "voltage_high"),
+        ("hip.stop_upper", 6.4, "rad", "turns more than once"),
     ],
 )
 def test_numbers_that_cannot_be_name_the_fields(tmp_path, path, value, unit, sentence):
     with pytest.raises(RobotError, match=sentence) as caught:
         load_robot(written(tmp_path / "leg.toml", {path: (value, unit)}, "legv2"))
     assert path.partition(".")[0] in str(caught.value)
+
+
+def test_a_limit_may_be_what_the_hardware_holds(tmp_path):
+    most = {
+        "watchdog": (0.1, "s"),
+        "temperature_limit": (75.0, "deg C"),
+        "voltage_high": (46.0, "V"),
+    }
+    numbers = {f"hardware.{name}": entry for name, entry in most.items()}
+    load_robot(written(tmp_path / "leg.toml", numbers, "legv2"))
 
 
 @pytest.mark.parametrize("name", shipped_robots())

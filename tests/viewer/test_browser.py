@@ -1,6 +1,5 @@
 """The page in a real browser without a screen; skipped, with the reason, where there is none."""
 
-import contextlib
 import io
 import time
 
@@ -62,17 +61,26 @@ def choose(page, label, option):
     page.get_by_role("option", name=option, exact=True).click()
 
 
-@contextlib.contextmanager
-def simulated(page, controller, height):
-    live = LiveSimulation((controller,), ROBOT, height)
+def picture(page):
+    """Return the middle of the page, as it is drawn now, rows x columns x (red, green, blue)."""
+    middle = {"x": 330, "y": 60, "width": 520, "height": 700}
+    shot = Image.open(io.BytesIO(page.screenshot(clip=middle))).convert("RGB")
+    return np.asarray(shot, dtype=np.int16)
+
+
+def share_of_the_motors(drawn):
+    return ((drawn[..., 1] > 110) & (drawn[..., 0] < 90)).mean()
+
+
+def test_the_leg_is_drawn_and_what_the_page_offers_changes_it_while_it_hops(page):
+    live = LiveSimulation(("energy-shaping",), ROBOT, 0.26)
     viewer = Viewer(live, port=0)
     with running(viewer):
         wait_for_leg(page, viewer)
-        yield live, viewer
-
-
-def test_what_the_page_offers_changes_the_simulation_while_it_hops(page):
-    with simulated(page, "energy-shaping", 0.26) as (live, viewer):
+        # The page is connected before its meshes are drawn, seconds before on a busy computer.
+        until(lambda: share_of_the_motors(picture(page)) > 0.005)
+        first = picture(page)
+        until(lambda: (np.abs(first - picture(page)).max(axis=-1) > 40).mean() > 0.005)
         until(lambda: shows_apex(page, 0.26))
         page.keyboard.press("k")
         until(lambda: live.height == pytest.approx(0.26 + KEY_STEP))
@@ -102,25 +110,6 @@ def test_what_the_page_offers_changes_the_simulation_while_it_hops(page):
         page.locator(".apex").nth(1).wait_for()
         choose(page, "Robot", "legv2")
         until(lambda: live.robot.name == "legv2" and len(live.tracks[1]) > 20)
-
-
-def picture(page):
-    """Return the middle of the page, as it is drawn now, rows x columns x (red, green, blue)."""
-    middle = {"x": 330, "y": 60, "width": 520, "height": 700}
-    shot = Image.open(io.BytesIO(page.screenshot(clip=middle))).convert("RGB")
-    return np.asarray(shot, dtype=np.int16)
-
-
-def share_of_the_motors(drawn):
-    return ((drawn[..., 1] > 110) & (drawn[..., 0] < 90)).mean()
-
-
-def test_the_leg_is_drawn_and_moves(page):
-    with simulated(page, "fast", 0.30):
-        # The page is connected before its meshes are drawn, seconds before on a busy computer.
-        until(lambda: share_of_the_motors(picture(page)) > 0.005)
-        first = picture(page)
-        until(lambda: (np.abs(first - picture(page)).max(axis=-1) > 40).mean() > 0.005)
 
 
 def test_a_trace_is_replayed(page, tmp_path):
