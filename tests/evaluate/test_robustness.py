@@ -13,8 +13,8 @@ from hopping_leg.evaluate import Entry
 from hopping_leg.evaluate.figures import draw_robustness
 from hopping_leg.evaluate.robustness import (
     PUSH_SECONDS,
+    Suite,
     level_rows,
-    make_suite,
     make_trials,
     outcome,
     run_suite,
@@ -32,7 +32,7 @@ COMMANDS = (0.25, 0.35)
 def plan(setup):
     def make(name, levels=None, commands=COMMANDS, repeats=2, **options):
         (axis,) = axes_named([name])
-        suite = make_suite(setup, commands=commands, repeats=repeats, **options)
+        suite = Suite(setup, commands, (axis,), repeats=repeats, **options)
         return make_trials(dataclasses.replace(axis, levels=levels or axis.levels), suite)
 
     return make
@@ -73,7 +73,7 @@ def test_the_seed_fixes_what_happens(plan, axis):
     assert first.seed == again.seed != other.seed
     for one, same in zip(arrays(first), arrays(again), strict=True):
         np.testing.assert_array_equal(one, same)
-    assert [t.case for t in first.trials] == [t.case for t in again.trials]
+    assert first.cases == again.cases
     assert any((a != b).any() for a, b in zip(arrays(first), arrays(other), strict=True))
 
 
@@ -94,18 +94,18 @@ def test_commands_step_away_and_back_within_the_suites_heights(plan):
 
 def test_the_hypercube_stays_within_its_share_of_the_moderate_ranges(plan, robot):
     made = plan(JOINT.name)
-    for trial in made.trials:
+    for trial in made.cases:
         share = trial.level
-        added = (trial.case.robot.base.mass - robot.base.mass) / robot.mass
+        added = (trial.robot.base.mass - robot.base.mass) / robot.mass
         assert -0.15 * share <= added <= 0.2 * share
-        assert 0 < trial.case.robot.reality.latency.command <= 0.005 * share
-    points = {t.case.push / t.level for t in made.trials}
-    assert len({round(p, 9) for p in points}) == len(made.trials) / 4
+        assert 0 < trial.robot.reality.latency.command <= 0.005 * share
+    points = {t.push / t.level for t in made.cases}
+    assert len({round(p, 9) for p in points}) == len(made.cases) / 4
 
 
 def test_a_suite_repeats_and_names_its_rows(setup, spring):
     names, progress = ("links", "pushes"), []
-    tiny = make_suite(setup, axes=names, commands=[0.28, 0.32], repeats=1, seconds=2.5)
+    tiny = Suite(setup, (0.28, 0.32), axes_named(names), repeats=1, seconds=2.5)
     judged = [Entry("my spring", spring)]
     first = run_suite(judged, tiny, lambda _, share: progress.append(share))
     assert progress == sorted(progress)
@@ -116,11 +116,11 @@ def test_a_suite_repeats_and_names_its_rows(setup, spring):
     assert [axis["name"] for axis in first["axes"]] == [*names]
     assert {row["axis"] for row in first["levels"]} == {"nominal", *names}
     with pytest.raises(UsageError, match=r"no axis 'wind'.*pushes"):
-        make_suite(setup, axes=["wind"])
+        axes_named(["wind"])
 
 
 def test_success_needs_every_hop_and_the_right_height(plan):
-    trial = plan("delay").trials[0]
+    trial = plan("delay").cases[0]
 
     def of(**changes):
         return outcome(trial, [dataclasses.replace(window_of(sine_trace(apex=0.319)), **changes)])

@@ -10,13 +10,10 @@ from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Entry, evaluate, runner
-from hopping_leg.evaluate.robustness import make_suite, run_suite
+from hopping_leg.evaluate.robustness import Suite, run_suite
+from hopping_leg.evaluate.robustness_axes import axes_named
 from hopping_leg.evaluate.runner import _note_stopped, load_entries
-from hopping_leg.evaluate.trials import (
-    COMMANDS,
-    floor_robot,
-    paper_trials,
-)
+from hopping_leg.evaluate.trials import COMMANDS, choose_commands, floor_robot, paper_trials
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 from tests.evaluate.conftest import Spring
@@ -73,8 +70,9 @@ def test_what_is_left_out_or_coarse_is_noted(setup, robot):
     assert "left out: staircase, ladder 0.22 m" in result.notes[0]
 
 
-def robustness(entries, setup, **options):
-    run_suite(entries, make_suite(setup, axes=["links"], **options))
+def robustness(entries, setup, commands, repeats=1):
+    heights = choose_commands(setup.robot, commands, repeats)
+    run_suite(entries, Suite(setup, heights, axes_named(["links"]), repeats))
 
 
 @pytest.mark.parametrize("suite", [evaluate, robustness])

@@ -1,3 +1,4 @@
+import dataclasses
 import itertools
 
 import numpy as np
@@ -5,7 +6,9 @@ import pytest
 from scipy import stats
 
 from hopping_leg.evaluate import statistics
-from hopping_leg.evaluate.statistics import cliffs_delta, compare, median_interval, with_misses
+from hopping_leg.evaluate.metrics import errors_of
+from hopping_leg.evaluate.statistics import cliffs_delta, compare, median_interval
+from tests.evaluate.test_metrics import sine_trace, window_of
 
 
 def test_cliffs_delta_counts_pairs():
@@ -45,13 +48,17 @@ def test_no_hops_give_no_numbers():
 
 
 def test_a_run_without_hops_is_a_miss_as_often_as_others_hop():
-    runs = [np.zeros(30), np.empty(0), np.zeros(20), np.empty(0)]
-    filled = with_misses(runs, [15.0, 15.0, 10.0, 4.0], [0.0, -0.1, 0.0, -0.2])
+    def window(hops, settled, standing=0.2):
+        apex, known = np.full(hops, 0.3), window_of(sine_trace())
+        changes = {"apex": apex, "settled": settled, "standing": standing, "command": 0.3}
+        return dataclasses.replace(known, **changes)
+
+    still = window(0, 4.0, 0.1)
+    filled = errors_of([window(30, 15.0), window(0, 15.0), window(20, 10.0), still])
     assert [len(run) for run in filled] == [30, 30, 20, 8]
-    assert set(filled[1]) == {-0.1}
-    assert set(filled[3]) == {-0.2}
-    (alone,) = with_misses([np.empty(0)], [15.0], [-0.05])
-    assert alone.tolist() == [-0.05]
+    assert filled[1] == pytest.approx(-0.1)
+    assert filled[3] == pytest.approx(-0.2)
+    assert errors_of([still])[0] == pytest.approx([-0.2])
 
 
 def test_the_interval_covers_the_median_as_often_as_promised():

@@ -151,12 +151,14 @@ def _judge(entries: "list[Entry]", setup: "RolloutConfig", args: Evaluate) -> "E
 
 def _robustness(args: Evaluate, entries: "list[Entry]", setup: "RolloutConfig") -> None:
     """Run the suite, print the scores, write numbers and figure."""
-    from hopping_leg.evaluate import figures, tables
-    from hopping_leg.evaluate.robustness import make_suite, run_suite
+    from hopping_leg.evaluate import figures, tables, trials
+    from hopping_leg.evaluate.robustness import Suite, run_suite
+    from hopping_leg.evaluate.robustness_axes import axes_named
     from hopping_leg.figures import to_svg
 
-    out, heights, seeds = args.out or Path("runs/robustness"), args.commands, args.seeds
-    suite = make_suite(setup, axes=args.axes, commands=heights, repeats=seeds, seed=args.seed)
+    out = args.out or Path("runs/robustness")
+    heights = trials.choose_commands(setup.robot, args.commands, args.seeds)
+    suite = Suite(setup, heights, axes_named(args.axes), args.seeds, args.seed)
     with Progress(parts=len(entries)) as bar:
         result = {"command": COMMAND.get(), **run_suite(entries, suite, bar.show)}
     file, figure = args.json or out / "robustness.json", out / "robustness.svg"

@@ -40,8 +40,7 @@ def run(args: Report) -> None:
         if path.suffix == flight_recording.SUFFIX:
             flight_recording.recover(path).save(path.with_suffix(".parquet"))
     runs = [trials.load_run(path) for path in args.traces]
-    controllers = list(dict.fromkeys(run.controller for run in runs))
-    evaluation = result.tabulate(runs, controllers, seed=0)
+    evaluation = result.tabulate(runs, seed=0)
     for name, figure in report.draw_report_figures(evaluation, runs).items():
         path = args.out / f"{name}.{args.format}"
         io.write_atomically(path, encode(figure, args.format))

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
+import polars as pl
 
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate import metrics, statistics
@@ -13,13 +14,16 @@ from hopping_leg.evaluate.motor_load import MotorLoad, motor_load, unknown
 from hopping_leg.evaluate.trials import Run
 from hopping_leg.io import plain
 from hopping_leg.robot import Robot
+from hopping_leg.trace import Trace
 
 SCHEMA = 2
 """Version of the JSON, raised when a name changes its meaning."""
 
+_WHOLE = ("height_m", "foot_clearance_m", "hip_torque_nm", "knee_torque_nm")
+
 
 @dataclass(frozen=True, kw_only=True)
-class HopStatistics:
+class Summary(MotorLoad):
     """One controller at one command, hops of all its runs pooled; 95 % intervals resample runs."""
 
     controller: str
@@ -60,11 +64,6 @@ class HopStatistics:
     runs: int
     missed_runs: int
     """Runs without a hop: their errors are misses, standing height minus command."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Summary(MotorLoad, HopStatistics):
-    """How one controller hops at one command, and what that is for the motors."""
 
 
 @dataclass(frozen=True)
@@ -144,93 +143,95 @@ class Evaluation:
         return {"schema": SCHEMA, **plain(asdict(self))}
 
 
-def tabulate(
-    runs: Sequence[Run], controllers: Sequence[str], seed: int, robot: Robot | None = None
-) -> Evaluation:
+Windows = dict[float, list[tuple[Run, metrics.HopWindow]]]
+"""Stretches of one controller's runs by rising command, m."""
+
+
+def tabulate(runs: Sequence[Run], seed: int, robot: Robot | None = None) -> Evaluation:
     """Measure runs and arrange the numbers; conditions, versions and notes stay empty.
 
     Args:
-        runs: Runs of all controllers.
-        controllers: Their names in the order of the rows.
+        runs: Runs of all controllers, which come in the order of the rows.
         seed: Seed of the bootstrap.
         robot: The leg of all runs; without it nothing is told of its motors.
     """
-    measured = [(run, metrics.measure(run.trace)) for run in runs]
-    own = {name: [pair for pair in measured if pair[0].controller == name] for name in controllers}
+    traces: dict[str, list[Trace]] = {}
+    for run in runs:
+        traces.setdefault(run.controller, []).append(run.trace)
+    measured = [(run, window) for run in runs for window in metrics.measure(run.trace)]
+    measured.sort(key=lambda pair: pair[1].command)
 
-    def groups(*kinds: str) -> list[tuple[str, float, list[metrics.HopWindow]]]:
-        """Return the windows in trials of some kinds by controller and rising command."""
-        found: dict[tuple[int, float], list[metrics.HopWindow]] = {}
-        for number, name in enumerate(controllers):
-            for kind in kinds:
-                for run, windows in own[name]:
-                    for window in windows if run.trial.kind == kind else ():
-                        found.setdefault((number, window.command), []).append(window)
-        return [(controllers[number], at, found[number, at]) for number, at in sorted(found)]
+    def windows(*kinds: str) -> dict[str, Windows]:
+        """Return the windows in trials of some kinds by controller."""
+        found: dict[str, Windows] = {name: {} for name in traces}
+        for run, window in measured:
+            if run.trial.kind in kinds:
+                found[run.controller].setdefault(window.command, []).append((run, window))
+        return found
 
     def rows(*kinds: str) -> list[Summary]:
-        return [summarise(name, at, found, seed, robot) for name, at, found in groups(*kinds)]
+        return [
+            summarise(name, at, [window for _, window in found], seed, robot)
+            for name, own in windows(*kinds).items()
+            for at, found in own.items()
+        ]
 
-    estimators = (metrics.judge_estimator(n, [run.trace for run, _ in own[n]]) for n in controllers)
+    pooled = windows("fixed", "sequence")
+    estimators = (metrics.judge_estimator(name, own) for name, own in traces.items())
     return Evaluation(
         summary=rows("fixed", "sequence"),
         sequence=rows("sequence"),
         ladder=rows("ladder"),
-        staircase=[stair for name in controllers for stair in _staircase(name, own[name])],
+        staircase=[_staircase(name, own) for name, own in windows("staircase").items() if own],
         neighbours=[
-            {"controller": name, "neighbours": _compare(own[name], seed)} for name in controllers
+            {"controller": name, "neighbours": _compare(own, seed)} for name, own in pooled.items()
         ],
         distributions=[
             {
                 "controller": name,
                 "command_m": at,
-                "apexes_m": np.round(metrics.pooled_apexes(found), 5).tolist(),
+                "apexes_m": np.round(np.concatenate([w.apex for _, w in found]), 5).tolist(),
             }
-            for name, at, found in groups("fixed", "sequence")
+            for name, own in pooled.items()
+            for at, found in own.items()
         ],
         estimators=[found for found in estimators if found],
     )
 
 
-Measured = Sequence[tuple[Run, list[metrics.HopWindow]]]
-
-
-def _compare(measured: Measured, seed: int) -> list[statistics.Neighbours]:
+def _compare(steps: Windows, seed: int) -> list[statistics.Neighbours]:
     """Compare neighbouring commands: within a run that has both, or of runs of equal number."""
     apexes: dict[float, dict[tuple[str, int], Array]] = {}
-    for run, windows in measured:
-        for window in windows if run.trial.kind in ("fixed", "sequence") else ():
-            key, found = (run.trial.kind, run.repeat), apexes.setdefault(window.command, {})
-            found[key] = np.concatenate([found.get(key, np.empty(0)), window.apex])
+    for command, found in steps.items():
+        own = apexes.setdefault(command, {})
+        for run, window in found:
+            key = (run.trial.kind, run.repeat)
+            own[key] = np.concatenate([own.get(key, np.empty(0)), window.apex])
     rows = []
-    for low, high in itertools.pairwise(sorted(apexes)):
+    for low, high in itertools.pairwise(apexes):
         pairs = [key for key in apexes[low] if key in apexes[high]]
         lower, upper = ([apexes[command][key] for key in pairs] for command in (low, high))
         rows.append(statistics.compare(low, lower, high, upper, seed))
     return rows
 
 
-def _staircase(label: str, measured: Measured) -> list[Staircase]:
-    """Return how all runs up the staircase went together, if there are any."""
-    stairs = [(run, windows) for run, windows in measured if run.trial.kind == "staircase"]
-    if not stairs:
-        return []
-    steps = [list(group) for group in zip(*(windows for _, windows in stairs), strict=True)]
-    commands = [step[0].command for step in steps]
-    errors = [np.median(np.concatenate(metrics.errors_of(step))) for step in steps]
-    medians, hopped = np.add(commands, errors), all(len(metrics.pooled_apexes(s)) for s in steps)
-    per_run = np.array([[statistics.of(np.median, w.apex) for w in run] for _, run in stairs])
-    return [
-        Staircase(
-            controller=label,
-            commands_m=commands,
-            median_apexes_m=medians.tolist(),
-            monotone=bool((np.diff(medians) > 0).all() and hopped),
-            monotone_runs=int((np.diff(per_run, axis=1) > 0).all(axis=1).sum()),
-            runs=len(stairs),
-            skipped_hops=sum(metrics.skipped_in_run(run.trace) for run, _ in stairs),
-        )
-    ]
+def _staircase(label: str, steps: Windows) -> Staircase:
+    """Return how all runs up the staircase went together."""
+    windows = [[window for _, window in found] for found in steps.values()]
+    errors = [np.median(np.concatenate(metrics.errors_of(step))) for step in windows]
+    medians = np.add(list(steps), errors)
+    hopped = all(len(metrics.pooled_apexes(step)) for step in windows)
+    per_run = np.array([[statistics.of(np.median, w.apex) for w in step] for step in windows])
+    runs = [run for run, _ in next(iter(steps.values()))]
+    return Staircase(
+        controller=label,
+        commands_m=list(steps),
+        median_apexes_m=medians.tolist(),
+        monotone=bool((np.diff(medians) > 0).all() and hopped),
+        monotone_runs=int((np.diff(per_run, axis=0) > 0).all(axis=0).sum()),
+        runs=len(runs),
+        skipped_hops=sum(metrics.skipped_in_run(run.trace) for run in runs),
+    )
 
 
 def summarise(
@@ -250,7 +251,8 @@ def summarise(
     settled = sum(w.settled for w in windows)
     per_second = 1 / settled if settled else float("nan")
     quartiles = np.percentile(apex, [25, 75]) if len(apex) else np.full(2, np.nan)
-    peak = np.max([w.peak_torque for w in windows], axis=0)
+    whole = pl.concat([part.table.select(_WHOLE) for part in parts])
+    base, knee = sum(w.base_contacts for w in windows), sum(w.knee_contacts for w in windows)
     return Summary(
         controller=controller,
         robot=str(parts[0].header.get("robot", "")),
@@ -271,13 +273,13 @@ def summarise(
         stance_bounces=sum(w.bounces for w in windows),
         hop_rate_hz=len(apex) * per_second,
         flight_fraction=sum(w.flight for w in windows) * per_second,
-        min_base_height_m=min(w.min_height for w in windows),
-        max_sink_m=max(w.max_sink for w in windows),
-        body_contacts=sum(w.body_contacts for w in windows),
-        base_contacts=sum(w.base_contacts for w in windows),
-        knee_contacts=sum(w.knee_contacts for w in windows),
-        peak_hip_torque_nm=float(peak[0]),
-        peak_knee_torque_nm=float(peak[1]),
+        min_base_height_m=float(whole["height_m"].to_numpy().min()),
+        max_sink_m=max(0.0, float(-whole["foot_clearance_m"].to_numpy().min())),
+        body_contacts=base + knee,
+        base_contacts=base,
+        knee_contacts=knee,
+        peak_hip_torque_nm=float(np.abs(whole["hip_torque_nm"].to_numpy()).max()),
+        peak_knee_torque_nm=float(np.abs(whole["knee_torque_nm"].to_numpy()).max()),
         measured_s=settled,
         runs=len(windows),
         missed_runs=sum(not len(w.apex) for w in windows),

@@ -17,8 +17,8 @@ from scipy.stats import qmc
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.rollout import Perturbation
-from hopping_leg.evaluate import metrics, runner, statistics, trials
-from hopping_leg.evaluate.robustness_axes import AXES, NOMINAL, Axis, Case, axes_named
+from hopping_leg.evaluate import metrics, runner, statistics
+from hopping_leg.evaluate.robustness_axes import AXES, NOMINAL, Axis, Case
 from hopping_leg.evaluate.runner import Entry, check_entries
 
 SCHEMA = 2
@@ -46,35 +46,15 @@ class Suite:
 
     setup: RolloutConfig
     """What controllers believe, with the paper's noise and delay."""
-    axes: tuple[Axis, ...]
     commands: tuple[float, ...]
     """Desired apex heights, m."""
-    repeats: int
+    axes: tuple[Axis, ...]
+    repeats: int = 5
     """Realisations of noise, delay and perturbation per level and command."""
-    seed: int
+    seed: int = 1000
     """All randomness follows from it."""
-    seconds: float
+    seconds: float = 10.0
     """Duration of each trial, s."""
-
-
-def make_suite(
-    setup: RolloutConfig,
-    *,
-    axes: Sequence[str] = (),
-    commands: Sequence[float] | None = None,
-    repeats: int = 5,
-    seed: int = 1000,
-    seconds: float = 10.0,
-) -> Suite:
-    """Return a suite that can be run; without axes, on all.
-
-    Commands are the paper's by default, scaled to the leg.
-
-    Raises:
-        UsageError: There is no such axis, or a command is out of reach.
-    """
-    chosen = trials.choose_commands(setup.robot, commands, repeats)
-    return Suite(setup, axes_named(axes), chosen, repeats, seed, seconds)
 
 
 def run_suite(
@@ -107,7 +87,7 @@ def run_suite(
                 entry.controller, suite.setup, plan.commands, plan.seed, tick, plan.perturbation
             )
             met[axis.name] = pl.DataFrame(
-                [outcome(t, metrics.measure(run.trace(leg))) for leg, t in enumerate(plan.trials)]
+                [outcome(c, metrics.measure(run.trace(leg))) for leg, c in enumerate(plan.cases)]
             )
             levels += level_rows(entry.label, axis.name, met[axis.name])
         del met[NOMINAL.name]
@@ -132,26 +112,10 @@ def run_suite(
 
 
 @dataclass(frozen=True)
-class RobustnessTrial:
-    """One leg of an axis' batch."""
-
-    level: float
-    """Level of the axis."""
-    command: float
-    """Desired apex height, m."""
-    repeat: int
-    """Number of the realisation, from 0."""
-    point: int
-    """Number of the hypercube's point, 0 elsewhere."""
-    case: Case
-    """What is simulated."""
-
-
-@dataclass(frozen=True)
 class AxisTrials:
     """All trials of an axis, run as one batch."""
 
-    trials: tuple[RobustnessTrial, ...]
+    cases: tuple[Case, ...]
     """n of them."""
     commands: Array
     """Desired heights, m, (ticks, n)."""
@@ -163,7 +127,7 @@ class AxisTrials:
 
 def make_trials(axis: Axis, suite: Suite) -> AxisTrials:
     """Lay down all trials of an axis: every realisation of each of its levels and commands."""
-    entropy, plain = [suite.seed, zlib.crc32(axis.name.encode())], Case(suite.setup.robot)
+    entropy, robot = [suite.seed, zlib.crc32(axis.name.encode())], suite.setup.robot
     points = 1 if axis.alter else JOINT_POINTS
     each = list(itertools.product(suite.commands, range(suite.repeats), range(points)))
     if axis.alter:
@@ -171,19 +135,19 @@ def make_trials(axis: Axis, suite: Suite) -> AxisTrials:
     else:  # the hypercube is drawn once; a level is a share of the way from neutral to its points
         cube = qmc.LatinHypercube(len(AXES), rng=np.random.default_rng(entropy))
         changes = [functools.partial(_change_all, row) for row in cube.random(len(each))]
-    legs = tuple(
-        RobustnessTrial(level, *one, change(plain, level))
+    cases = tuple(
+        change(Case(robot, level, *one), level)
         for level in axis.levels
         for one, change in zip(each, changes, strict=True)
     )
     command, torque, force, ground = (
         np.stack(events, axis=1)
-        for events in zip(*(_events(leg, suite) for leg in legs), strict=True)
+        for events in zip(*(_events(case, suite) for case in cases), strict=True)
     )
     return AxisTrials(
-        legs,
+        cases,
         command,
-        Perturbation(tuple(leg.case.robot for leg in legs), torque, force, ground),
+        Perturbation(tuple(case.robot for case in cases), torque, force, ground),
         int(np.random.SeedSequence(entropy).generate_state(1)[0]),
     )
 
@@ -198,19 +162,19 @@ def _change_all(point: Array, case: Case, share: float) -> Case:
     return case
 
 
-def _events(trial: RobustnessTrial, suite: Suite) -> tuple[Array, Array, Array, Array]:
+def _events(case: Case, suite: Suite) -> tuple[Array, Array, Array, Array]:
     """Return command, torques, force on the base and ground of a trial over time.
 
     Draws depend on seed, command, repeat and point alone, so that levels differ in size only.
     """
-    rng = np.random.default_rng([suite.seed, trial.repeat, trial.point, round(1e4 * trial.command)])
-    case, rate = trial.case, suite.setup.rate
+    rng = np.random.default_rng([suite.seed, case.repeat, case.point, round(1e4 * case.command)])
+    rate = suite.setup.rate
     time = np.arange(round(suite.seconds * rate)) / rate
     torque = case.torque_noise * rng.standard_normal((len(time), 2))
     force = case.push / PUSH_SECONDS * _pushes(rng, len(time), rate)
     at = np.floor(time / GROUND_SECONDS).astype(int)
     ground = case.ground * rng.choice((-1, 1)) * np.array([0, 1, 0, -1])[at % 4]
-    return _stepped(trial, suite.commands, time), torque, force, ground
+    return _stepped(case, suite.commands, time), torque, force, ground
 
 
 def _pushes(rng: np.random.Generator, ticks: int, rate: float) -> Array:
@@ -223,17 +187,17 @@ def _pushes(rng: np.random.Generator, ticks: int, rate: float) -> Array:
     return pushes
 
 
-def _stepped(trial: RobustnessTrial, commands: Sequence[float], time: Array) -> Array:
+def _stepped(case: Case, commands: Sequence[float], time: Array) -> Array:
     """Return the command over time, m: away by a step and back, within the suite's heights."""
     low, high = min(commands), max(commands)
-    share = (trial.command - low) / (high - low) if high > low else 0.5
-    bottom = trial.command - share * trial.case.command_step
-    pair = (bottom, bottom + trial.case.command_step)
+    share = (case.command - low) / (high - low) if high > low else 0.5
+    bottom = case.command - share * case.command_step
+    pair = (bottom, bottom + case.command_step)
     first, second = pair if share <= 0.5 else pair[::-1]
     return np.where(np.floor(time / SWITCH_SECONDS) % 2 == 0, first, second)
 
 
-def outcome(trial: RobustnessTrial, windows: Sequence[metrics.HopWindow]) -> dict[str, Any]:
+def outcome(case: Case, windows: Sequence[metrics.HopWindow]) -> dict[str, Any]:
     """Return how a trial went, given its stretches of constant command.
 
     Its error is the median apex minus command; where the command steps, of the height that is
@@ -245,13 +209,13 @@ def outcome(trial: RobustnessTrial, windows: Sequence[metrics.HopWindow]) -> dic
     error, skipped = max(errors, key=abs), sum(w.skipped for w in windows)
     missed = any(not len(metrics.pooled_apexes(group)) for group in groups)
     return {
-        "level": trial.level,
-        "command_m": trial.command,
-        "repeat": trial.repeat,
+        "level": case.level,
+        "command_m": case.command,
+        "repeat": case.repeat,
         "error_m": error,
         "missed": missed,
         "skipped": skipped,
-        "contacts": sum(w.body_contacts for w in windows),
+        "contacts": sum(w.base_contacts + w.knee_contacts for w in windows),
         "success": skipped == 0 and not missed and abs(error) <= TOLERANCE,
     }
 

@@ -15,10 +15,18 @@ from hopping_leg.robot.parameters import JOINTS, Robot
 
 @dataclass(frozen=True)
 class Case:
-    """One world; its controller knows the robot alone, as it was before the case changed it."""
+    """One trial; its controller knows the robot alone, as it was before an axis changed it."""
 
     robot: Robot
     """What is simulated."""
+    level: float = 0.0
+    """Level of the axis."""
+    command: float = 0.0
+    """Desired apex height, m."""
+    repeat: int = 0
+    """Number of the realisation, from 0."""
+    point: int = 0
+    """Number of the hypercube's point, 0 elsewhere."""
     torque_noise: float = 0.0
     """Standard deviation of the white noise added to each joint's torque, N m."""
     push: float = 0.0

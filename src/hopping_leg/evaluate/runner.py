@@ -172,7 +172,7 @@ def evaluate(
         notes += _note_left_out(entry, [t for t in planned if t not in fitting])
         notes += _note_stopped(entry.label, own, setup)
         runs += own
-    measured = result.tabulate(runs, [c.label for c in entries], seed, world.robot)
+    measured = result.tabulate(runs, seed, world.robot)
     groups = [
         row
         for group in dict.fromkeys(c.group for c in entries if c.group)

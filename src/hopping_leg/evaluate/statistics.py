@@ -2,7 +2,7 @@
 
 Hops of one run depend on each other, runs with seeds of their own do not: tests are made per run
 and combined, and intervals resample runs, twins or policies, whatever was drawn independently.
-Nothing that failed is dropped: a run without a hop enters as misses, see ``with_misses``.
+Nothing that failed is dropped: a run without a hop enters as misses, see ``metrics.errors_of``.
 """
 
 import math
@@ -24,27 +24,6 @@ Interval = tuple[float, float]
 def of(statistic: Callable[[Array], Any], values: Array) -> float:
     """Return a statistic of values, NaN where there are none."""
     return float(statistic(values)) if len(values) else math.nan
-
-
-def with_misses(
-    runs: Sequence[Array], seconds: Sequence[float], misses: Sequence[float]
-) -> list[Array]:
-    """Return the runs' errors with those that have no hop filled in.
-
-    A run without a hop missed its command by the whole distance from where it stood. It counts as
-    often as a run of its length has hops in the median of the others, at least once.
-
-    Args:
-        runs: Errors of each run's hops, (hops,).
-        seconds: Time in which each run's hops were counted, s.
-        misses: Error of each run if it has none: standing height minus command, m.
-    """
-    rates = [len(r) / s for r, s in zip(runs, seconds, strict=True) if len(r) and s > 0]
-    rate = float(np.median(rates)) if rates else 0.0
-    return [
-        run if len(run) else np.full(max(1, round(rate * time)), miss)
-        for run, time, miss in zip(runs, seconds, misses, strict=True)
-    ]
 
 
 def bootstrap(

@@ -21,15 +21,8 @@ Row = dict[str, Any]
 _NARROW = 7  # characters of a heading on a line of the terminal
 
 
-def millimetres(value: float | None) -> str:
-    """Return a length in mm; a dash where there is none."""
-    return "-" if value is None else f"{1e3 * value:z.1f}"
-
-
 _LOOKS: dict[str, tuple[str, float, str]] = {
-    "command_m": ("m", 1, ".2f"),
-    "lower_m": ("m", 1, ".2f"),
-    "upper_m": ("m", 1, ".2f"),
+    **dict.fromkeys(("command_m", "commands_m", "lower_m", "upper_m"), ("m", 1, ".2f")),
     "p": ("", 1, ".1g"),
     "overlap": ("%", 100, ".1f"),
     **dict.fromkeys(("cliffs_delta", "cliffs_delta_low", "cliffs_delta_high"), ("", 1, "+.3f")),
@@ -66,8 +59,9 @@ def _column(name: str) -> Column:
     bad = _BAD.get(name, lambda _value: False)
 
     def text(row: Row) -> str:
-        value = row[name]
-        return "-" if value is None else format(factor * value if unit else value, form)
+        values = row[name] if isinstance(row[name], list) else [row[name]]
+        shown = [v if v is None or not unit else factor * v for v in values]
+        return " ".join("-" if v is None else format(v, form) for v in shown)
 
     return Column(
         f"{words} / {unit}" if unit else words,
@@ -98,6 +92,7 @@ TABLES = {
     "joints": f"{_HOW} peak_knee_speed_rad_s torque_reversals_hz outside_limits_fraction"
     " soft_limit_rms_nm soft_limit_share stop_contacts",
     "ladder": f"{_HOW} median_error_m std_m hops skipped_hops body_contacts",
+    "staircase": "controller commands_m median_apexes_m monotone monotone_runs runs skipped_hops",
     "distributions": "controller lower_m upper_m p cliffs_delta cliffs_delta_low"
     " cliffs_delta_high overlap",
     "estimators": "controller flight_bias_m flight_std_m stance_bias_m stance_std_m apex_bias_m"
@@ -118,25 +113,7 @@ def evaluation_tables(evaluation: Row) -> dict[str, Markup]:
     return {
         **{about: table(_columns(names), rows[about]) for about, names in TABLES.items()},
         "secondary": table(_columns(TABLES["summary"]), secondary["summary"]),
-        "staircase": _staircase_table(evaluation["staircase"]),
     }
-
-
-def _staircase_table(stairs: Sequence[Row]) -> Markup:
-    """Return medians per step and what follows from them; all climb the same steps."""
-
-    def step(number: int, command: float) -> Column:
-        return Column(f"{command:.2f} m", lambda row: millimetres(row["median_apexes_m"][number]))
-
-    commands = stairs[0]["commands_m"] if stairs else ()
-    columns = (
-        _column("controller"),
-        *(step(number, command) for number, command in enumerate(commands)),
-        Column("monotone", lambda row: "yes" if row["monotone"] else "no"),
-        Column("runs monotone", lambda row: f"{row['monotone_runs']} of {row['runs']}"),
-        _column("skipped_hops"),
-    )
-    return table(columns, stairs, "median apex at each step / mm")
 
 
 def verdict(evaluation: Evaluation, controller: str) -> str:
@@ -153,8 +130,8 @@ def verdict(evaluation: Evaluation, controller: str) -> str:
     worst = max(errors, key=errors.__getitem__)
     skipped, touched = (sum(r.skipped_hops for r in rows), sum(r.body_contacts for r in rows))
     parts = [
-        f"misses its command by {millimetres(median(errors.values()))} mm in the median of"
-        f" {len(heights)} heights and by {millimetres(errors[worst])} mm at the worst,"
+        f"misses its command by {1e3 * median(errors.values()):.1f} mm in the median of"
+        f" {len(heights)} heights and by {1e3 * errors[worst]:.1f} mm at the worst,"
         f" {worst.command_m:.2f} m",
         *([f"does not hop at {', '.join(f'{height:.2f}' for height in still)} m"] if still else []),
         f"skips {skipped} of {skipped + sum(row.hops for row in rows)} hops",

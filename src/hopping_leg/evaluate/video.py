@@ -20,7 +20,6 @@ from PIL import Image, ImageDraw, ImageFont
 
 from hopping_leg.evaluate import metrics, trials
 from hopping_leg.figures import COMMAND, controller_colours, rgb
-from hopping_leg.hop_detection import trace_hops
 from hopping_leg.robot import Robot, get_spec
 from hopping_leg.trace import Trace
 
@@ -52,25 +51,17 @@ class Video:
 
 
 def render_videos(robot: Robot, runs: Sequence[trials.Run]) -> dict[str, Video]:
-    """Render a video per controller: a hop of its first fixed trial at each command, half speed."""
+    """Render a video per controller: hops of its first fixed trial at each command, half speed."""
     colours = controller_colours(run.controller for run in runs)
     clips: dict[str, list[Clip]] = {}
     for run in runs:
         if run.trial.kind == "fixed" and run.repeat == 0:
-            poses = sample(run.trace, _first_apex(run.trace), CLIP_SECONDS)
+            poses = sample(run.trace, metrics.START_SECONDS, CLIP_SECONDS)
             own = clips.setdefault(run.controller, [])
             own.append(Clip(run.controller, colours[run.controller], poses))
     with ThreadPoolExecutor() as pool:
         shown = functools.partial(render_clips, robot, milliseconds=1000 * SLOWDOWN / FRAME_RATE)
         return dict(zip(clips, pool.map(shown, clips.values()), strict=True))
-
-
-def _first_apex(trace: Trace) -> float:
-    """Return when the first apex after the start is, s."""
-    time = trace.column("time_s")
-    apexes = time[trace_hops(trace).tick]
-    settled = apexes[apexes >= metrics.START_SECONDS]
-    return float(settled[0] if len(settled) else min(metrics.START_SECONDS, time[-1]))
 
 
 def sample(
@@ -88,7 +79,10 @@ def sample(
 
 def render_clips(robot: Robot, clips: Sequence[Clip], milliseconds: float) -> Video:
     """Render clips of the same length side by side, each frame shown so long."""
-    spec = get_spec(robot)
+    spec, box = get_spec(robot), mujoco.mjtGeom.mjGEOM_BOX
+    grey = [*(part / 255 for part in rgb(COMMAND)), 1.0]
+    line = spec.worldbody.add_body(mocap=True)  # the commanded height of the hip, behind the leg
+    line.add_geom(type=box, size=[0.25, 0.001, 0.0015], rgba=grey, contype=0, conaffinity=0)
     spec.compile()
     asked = {"leg": spec.to_xml(), "clips": [asdict(clip) for clip in clips]}
     try:
@@ -140,10 +134,10 @@ def _draw_frames(model: mujoco.MjModel, clips: Sequence[Clip]) -> list[Image.Ima
             draw = ImageDraw.Draw(picture)
             for column, clip in enumerate(clips):
                 *data.qpos[:], command = poses[column, frame]
+                data.mocap_pos[0] = 0.0, 0.06, command
                 housing[:3] = np.array(rgb(clip.colour)) / 255
                 mujoco.mj_forward(model, data)
                 renderer.update_scene(data, camera)
-                _mark(renderer.scene, command)
                 picture.paste(Image.fromarray(renderer.render()), (column * width, 0))
                 at = column * width + 12
                 draw.text((at, 8), clip.name, clip.colour, font, stroke_width=0.4)
@@ -151,19 +145,6 @@ def _draw_frames(model: mujoco.MjModel, clips: Sequence[Clip]) -> list[Image.Ima
                 draw.text((at, 30), text, (40, 40, 40), font)
             pictures.append(picture)
     return pictures
-
-
-def _mark(scene: mujoco.MjvScene, command: float) -> None:
-    """Draw the commanded height of the hip axis as a thin line behind the leg."""
-    mujoco.mjv_initGeom(
-        scene.geoms[scene.ngeom],
-        mujoco.mjtGeom.mjGEOM_BOX,
-        np.array([0.25, 0.001, 0.0015]),
-        np.array([0.0, 0.06, command]),
-        np.eye(3).ravel(),
-        np.array([*(part / 255 for part in rgb(COMMAND)), 1.0], dtype=np.float32),
-    )
-    scene.ngeom += 1
 
 
 if __name__ == "__main__":
