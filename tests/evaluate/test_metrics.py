@@ -40,7 +40,7 @@ def with_column(trace, name, values):
 
 
 def test_a_steady_run():
-    (window,) = measure(sine_trace())
+    window = window_of(sine_trace())
     assert window.command == 0.30
     assert len(window.apex) == 16
     assert window.error == pytest.approx(0.01, abs=1e-4)
@@ -62,13 +62,12 @@ def test_the_start_and_every_switch_are_left_to_settle():
 
 def test_contacts_are_counted_as_events_even_while_the_run_settles():
     trace = sine_trace()
-    knee = trace.column("knee_clearance_m")
+    knee, base = (trace.column(f"{part}_clearance_m") for part in ("knee", "base"))
     knee[10:20] = -0.001
     knee[500:503] = 0.0
-    base = trace.column("base_clearance_m")
     base[0:5] = -0.01
     touched = with_column(with_column(trace, "knee_clearance_m", knee), "base_clearance_m", base)
-    (window,) = measure(touched)
+    window = window_of(touched)
     assert (window.base_contacts, window.knee_contacts) == (1, 2)
 
 
@@ -81,28 +80,15 @@ def test_a_hop_missed_right_after_a_switch_is_seen_in_the_whole_run():
     assert skipped_in_run(missed) == 1
 
 
-ERRORS = (-0.004, 0.001, 0.003)
-
-
-@pytest.fixture
-def rows(judged):
-    """Rows of three policies at one command."""
-    first = judged.evaluation.summary[0]
-    return [
-        dataclasses.replace(
-            first, controller=f"p{i}", median_error_m=e, std_m=0.01, skipped_hops=1, body_contacts=2
-        )
-        for i, e in enumerate(ERRORS)
-    ]
-
-
-def test_policies_of_one_recipe_are_pooled(rows):
+def test_policies_of_one_recipe_are_pooled(judged):
+    first, errors = judged.evaluation.summary[0], (-0.004, 0.001, 0.003)
+    known = dataclasses.replace(first, std_m=0.01, skipped_hops=1, body_contacts=2)
+    rows = [dataclasses.replace(known, median_error_m=error) for error in errors]
     (group,) = pool_group("fast", rows, 0)
     assert (group.group, group.policies, group.motionless) == ("fast", 3, 0)
-    assert group.median_error_m == 0.001
-    assert group.worst_abs_error_m == 0.004
+    assert (group.median_error_m, group.worst_abs_error_m) == (0.001, 0.004)
     assert (group.skipped_hops, group.body_contacts) == (3, 6)
-    assert ERRORS[0] <= group.median_error_low_m <= group.median_error_high_m <= ERRORS[-1]
+    assert errors[0] <= group.median_error_low_m <= group.median_error_high_m <= errors[-1]
     silent = dataclasses.replace(rows[0], median_error_m=-0.05, std_m=np.nan, hops=0)
     (group,) = pool_group("fast", [silent, *rows[1:]], 0)
     assert (group.policies, group.motionless, group.worst_abs_error_m) == (3, 1, 0.05)

@@ -1,5 +1,5 @@
-import dataclasses
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -12,21 +12,18 @@ COMMAND = "hop evaluate spring --commands 0.25,0.35"
 
 
 @pytest.fixture(scope="module")
-def commanded(judged):
-    return EvaluationRun(dataclasses.replace(judged.evaluation, command=COMMAND), judged.runs)
+def page(judged):
+    commanded = EvaluationRun(replace(judged.evaluation, command=COMMAND), judged.runs)
+    page = write_report(commanded).decode()
+    assert write_report(commanded).decode() == page, "the same evaluation has the same bytes"
+    return page
 
 
-@pytest.fixture(scope="module")
-def page(commanded):
-    return write_report(commanded).decode()
-
-
-def test_the_page_needs_nothing_from_outside_and_is_the_same_again(page, commanded):
+def test_the_page_needs_nothing_from_outside(page):
     sources = re.findall(r'(?:src|href)="([^"]*)"', page)
     assert len(sources) >= 4
     assert all(source.startswith("data:") for source in sources)
     assert not [word for word in ("<script", "@import", "url(") if word in page]
-    assert write_report(commanded).decode() == page
 
 
 def test_the_page_states_its_numbers_and_how_to_make_it_again(page, judged):
@@ -39,8 +36,8 @@ def test_the_page_states_its_numbers_and_how_to_make_it_again(page, judged):
 
 def test_names_are_escaped_a_video_is_embedded_and_a_missing_one_explained(judged, monkeypatch):
     monkeypatch.setattr("hopping_leg.evaluate.report.draw_report_figures", lambda *_: {})
-    row = dataclasses.replace(judged.evaluation.summary[0], controller="<b>&")
-    evaluation = dataclasses.replace(judged.evaluation, summary=[row], distributions=[])
+    row = replace(judged.evaluation.summary[0], controller="<b>&")
+    evaluation = replace(judged.evaluation, summary=[row], distributions=[])
     videos = {"spring": Video(None, "egl: no display"), "other": Video(b"RIFF")}
     page = write_report(EvaluationRun(evaluation, judged.runs), videos).decode()
     assert "<b>" not in page
@@ -51,20 +48,20 @@ def test_names_are_escaped_a_video_is_embedded_and_a_missing_one_explained(judge
 
 def test_a_verdict_names_the_worst_height_and_everything_that_went_wrong(judged):
     low, high = judged.evaluation.summary
-    low = dataclasses.replace(low, median_error_m=-0.001, skipped_hops=0, body_contacts=0)
+    low = replace(low, median_error_m=-0.001, skipped_hops=0, body_contacts=0)
     changes = {"median_error_m": 0.0034, "skipped_hops": 2, "hops": 98 - low.hops}
-    high = dataclasses.replace(high, **changes, body_contacts=1)
+    high = replace(high, **changes, body_contacts=1)
 
     def said(*rows):
-        evaluation = dataclasses.replace(judged.evaluation, summary=list(rows), ladder=[])
+        evaluation = replace(judged.evaluation, summary=list(rows), ladder=[])
         return verdict(evaluation, "spring")
 
     assert said(low, high) == (
         "misses its command by 2.2 mm in the median of 2 heights and by 3.4 mm at the worst,"
         " 0.35 m; skips 2 of 100 hops; base or knee touch the ground 1 times."
     )
-    still = dataclasses.replace(high, hops=0, median_error_m=float("nan"))
-    silent = dataclasses.replace(judged.evaluation, summary=[still], distributions=[])
+    still = replace(high, hops=0, median_error_m=float("nan"))
+    silent = replace(judged.evaluation, summary=[still], distributions=[])
     page = write_report(EvaluationRun(silent, judged.runs)).decode()
     assert "nan" not in re.sub(r"data:[^\"]*", "", page)
     assert "does not hop at 0.35 m" in said(low, still)

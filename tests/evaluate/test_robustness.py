@@ -168,10 +168,6 @@ def test_the_interval_is_over_realisations_not_over_trials():
     more = score({"delay": pl.concat([rows(0.1, *wins)] * 10)}, 1)
     assert more == few, "more trials of a realisation tell no more"
     assert few[2] - few[1] > 0.5
-    many = score({"delay": rows(0.1, *wins * 20)}, 1)
-    assert many[2] - many[1] < 0.3
-    _, low, high = score({"delay": rows(0.1, *[True] * 3)})
-    assert low < 0.75 < high == 1, "three that agree are no certainty"
     steady = pl.concat([rows(0.1, *[True] * 20), rows(0.2, *[False] * 20)])
     middle, low, high = score({"delay": steady})
     assert middle == 0.5, "levels are chosen, not drawn: their difference is no scatter"

@@ -40,11 +40,14 @@ def test_the_combined_p_value_is_uniform_where_nothing_differs():
     assert stats.kstest(p, "uniform").pvalue > 0.01
 
 
-def test_no_hops_give_no_numbers():
+def test_too_few_give_no_numbers():
     none = compare(0.25, [np.empty(0)], 0.3, [np.ones(3)], 0)
     assert none.runs == 0
     assert np.isnan([none.p, none.cliffs_delta, none.pooled_p]).all()
     assert np.isnan(median_interval([np.empty(0)], 0)).all()
+    twins = list(np.random.default_rng(0).normal(0, 1, (20, 3)))
+    assert np.isfinite(median_interval(twins, 0, 20)).all()
+    assert np.isnan(median_interval(twins[1:], 0, 20)).all(), "units below the least"
 
 
 def test_a_run_without_hops_is_a_miss_as_often_as_others_hop():
@@ -69,12 +72,6 @@ def test_the_interval_covers_the_median_as_often_as_promised():
         low, high = median_interval(runs, trial)
         inside += low <= 0 <= high
     assert inside >= 51
-
-
-def test_intervals_need_as_many_units_as_is_asked_for():
-    twins = list(np.random.default_rng(0).normal(0, 1, (20, 3)))
-    assert np.isfinite(median_interval(twins, 0, 20)).all()
-    assert np.isnan(median_interval(twins[1:], 0, 20)).all()
 
 
 def test_realisations_that_agree_are_no_certainty():
