@@ -26,21 +26,16 @@ from studies.shared import main
 LIMITS = Limits((10.0, 10.0), (18.0, 42.0), 65.0)
 
 
-def comparable(row):
-    return {key: value for key, value in row.items() if key != "seconds"}
-
-
 @pytest.mark.parametrize("name", FAMILIES)
 def test_a_family_draws_the_same_from_the_same_seed_and_much_else_from_others(name):
     family = FAMILIES[name]
     mishaps = [family.draw(np.random.default_rng(seed)) for seed in range(40)]
     assert family.draw(np.random.default_rng(0)) == mishaps[0]
     assert len({str(mishap) for mishap in mishaps}) > 10
-    assert all(0 <= mishap.at <= HOP_SECONDS for mishap in mishaps)
     for m in mishaps:
+        assert 0 <= m.at <= HOP_SECONDS
         assert m.fault or m.start or m.stall or m.dies or m.health
-    at_start = family.refused or family.grounded
-    assert all((mishap.start is not None) == at_start for mishap in mishaps)
+        assert (m.start is not None) == (family.refused or family.grounded)
     assert family.reasons or family.refused or name == "killed host"
 
 
@@ -91,7 +86,7 @@ def test_a_trial_is_exact_and_the_mishap_the_same_for_all_controllers():
     case = Case("drive fault", "energy-shaping", robot_of(["fast"]), 0, 0)
     first, again = play_case(case), play_case(case)
     other = play_case(dataclasses.replace(case, controller="fast"))
-    assert comparable(first) == comparable(again)
+    assert first | {"seconds": 0} == again | {"seconds": 0}
     assert first["problems"] == other["problems"] == []
     assert first["what"] == other["what"]
     assert first["reason"] == "DRIVE_FAULT"
@@ -167,11 +162,7 @@ def test_every_family_has_a_row_that_says_what_notices_it_and_what_follows():
     case = {row["fault"]: row for row in rows({"rows": [{**stored, "braked_max_s": None}]})}
     assert list(case) == list(FAMILIES)
     assert all(row["noticed_by"] and row["follows"] for row in case.values())
-    assert case["total loss"]["noticed_by"] == "A drive did not answer in several ticks."
     assert case["total loss"]["upper_bound"] == pytest.approx(0.095, abs=0.001)
-    assert case["wrong configuration"]["follows"] == "the leg is not armed"
-    assert case["wrong wiring"]["follows"] == "the leg does not hop"
-    assert case["duplicated reply"]["follows"] == "it hops on"
     assert case["drive fault"]["trials"] == 0
 
 
@@ -184,10 +175,11 @@ def answered(time, mode=DriveMode.POSITION, voltage=24.0, temperature=30.0):
 
 
 def reaction_to(*entries, jumped=False):
-    answers = [e for e in entries if isinstance(e, ReplyEvent)]
+    commands, answers = (
+        [e for e in entries if isinstance(e, k)] for k in (CommandEvent, ReplyEvent)
+    )
     log = SimpleNamespace(
-        commands=[e for e in entries if isinstance(e, CommandEvent)],
-        answers=lambda since: (e for e in answers if e.time >= since),
+        commands=commands, answers=lambda since: (e for e in answers if e.time >= since)
     )
     return reaction(log, LIMITS, 0.5, jumped=jumped)
 

@@ -12,8 +12,6 @@ from studies.shared import interleave, main
 from studies.speed.deploy import Deploy, settled_apexes
 from studies.speed.env import Env, record
 
-ROBOT = load_robot("legv2-paper")
-
 
 def measured(tmp_path, options, *words):
     """Return the numbers that a part of the study writes."""
@@ -32,7 +30,8 @@ def test_rounds_alternate_and_the_cold_one_is_left_out():
 def test_the_recorded_motion_repeats():
     options = TaskConfig(action_torque=(10, 20), episode=3600)
     rng = np.random.default_rng(0)
-    task = HoppingTask(ROBOT, 3, options, paper_reward(ROBOT), rng, 1)
+    robot = load_robot("legv2-paper")
+    task = HoppingTask(robot, 3, options, paper_reward(robot), rng, 1)
     motion = record(task, 100)
     end = task.legs.state.copy()
     assert end[:, 0].max() > 0.15

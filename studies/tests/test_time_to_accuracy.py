@@ -43,17 +43,10 @@ def test_errors_count_by_magnitude_and_a_height_without_hops_is_off_by_that_heig
 
 
 def test_points_in_time_are_averaged_over_seeds_in_their_order():
-    rows = [
-        row("b", 0, 10, 0.2),
-        row("b", 0, 20, 0.1, 3),
-        row("b", 1, 12, 0.4),
-        row("b", 1, 24, 0.3, 4),
-        row("a", 0, 5, 0.5),
-    ]
-    first, second, other = summarise(rows)
-    assert [(r["recipe"], r["runs"]) for r in (first, second, other)] == [
-        ("b", 2), ("b", 2), ("a", 1),
-    ]  # fmt: skip
+    rows = [("b", 0, 10, 0.2), ("b", 0, 20, 0.1, 3), ("b", 1, 12, 0.4), ("b", 1, 24, 0.3, 4)]
+    found = summarise([row(*numbers) for numbers in (*rows, ("a", 0, 5, 0.5))])
+    assert [(r["recipe"], r["runs"]) for r in found] == [("b", 2), ("b", 2), ("a", 1)]
+    first, second, other = found
     assert (first["seconds"], second["seconds"], other["seconds"]) == (11, 22, 5)
     assert first["mean_error_m"] == pytest.approx(0.3)
     assert second["worst_seed_mean_error_m"] == pytest.approx(0.3)

@@ -45,14 +45,14 @@ def test_rows_are_medians_over_twins_with_intervals_around_them_if_there_are_twe
 
 
 def test_the_ratio_meets_the_same_twins():
-    errors = {"identified": {}, "cad": {}}
-    for k in range(20):
-        errors["identified"][f"twin-{k}"] = (0.001 * (k + 1), 0.002 * (k + 1))
-        errors["cad"][f"twin-{k}"] = (0.003 * (k + 1), -0.006 * (k + 1))
+    factors = {"identified": (0.001, 0.002), "cad": (0.003, -0.006)}
+    errors = {
+        method: {f"twin-{k}": ((k + 1) * low, (k + 1) * high) for k in range(20)}
+        for method, (low, high) in factors.items()
+    }
     found = compare("identified", "cad", trials(errors))
-    assert found["ratio"] == pytest.approx(3.0)
-    assert found["ratio_low"] == pytest.approx(3.0)
-    assert found["ratio_high"] == pytest.approx(3.0)
+    ratios = [found[name] for name in ("ratio", "ratio_low", "ratio_high")]
+    assert ratios == pytest.approx([3.0] * 3)
 
 
 def test_order_is_of_the_apexes_and_a_leg_that_stands_has_none():

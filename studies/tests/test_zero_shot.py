@@ -65,11 +65,9 @@ def test_shares_are_of_pairs_that_are_reached_and_closeness_is_pair_by_pair():
         row("energy-shaping", "b", 0.3, 0.02),
     ]
     one, shaped = summarize(pairs, ("one", "energy-shaping"))
-    assert one["pairs"] == 3
-    assert one["within_5mm"] == pytest.approx(2 / 3)
-    assert one["within_10mm"] == 1
-    assert one["closer_than_energy_shaping"] == pytest.approx(2 / 3)
-    assert one["would_be_stopped"] == pytest.approx(1 / 3)
+    shares = {"within_5mm": 2 / 3, "within_10mm": 1, "would_be_stopped": 1 / 3}
+    expected = {"pairs": 3, "closer_than_energy_shaping": 2 / 3, **shares}
+    assert {name: one[name] for name in expected} == pytest.approx(expected)
     assert shaped["closer_than_energy_shaping"] == 0
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers import RolloutConfig, rollout
-from hopping_leg.controllers.mpc import TrueStateMpc, hop_law
+from hopping_leg.controllers.mpc import TrueStateMpc
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import UsageError
 from hopping_leg.io import replace_at
@@ -57,17 +57,6 @@ def test_hops_are_calm_and_the_foot_alone_touches_the_ground(hopped):
     for joint in ("hip", "knee"):
         limits, angle = getattr(robot, joint), data[f"{joint}_position_rad"]
         assert np.mean((limits.lower <= angle) & (angle <= limits.upper)) >= 0.99
-
-
-def test_a_hop_is_a_landing_then_a_push_then_a_flight(hopped):
-    _, run = hopped
-    cycle = (hop_law.LANDING, hop_law.PUSH, hop_law.FLIGHT)
-    for leg, phase in enumerate(run.data["phase"][run.time > SETTLED].T):
-        changes = phase[1:][np.diff(phase) != 0]
-        first = cycle.index(changes[0])
-        assert [cycle[(first + k) % 3] for k in range(len(changes))] == changes.tolist()
-        hops = np.count_nonzero(run.time[hops_of(run, leg).tick] > SETTLED)
-        assert abs(np.count_nonzero(changes == hop_law.FLIGHT) - hops) <= 1
 
 
 def test_legs_that_differ_hop_as_high_each_on_any_number_of_threads(monkeypatch):

@@ -170,13 +170,9 @@ def test_cogging_repeats_with_the_motor_angle_and_has_its_amplitude():
     np.testing.assert_allclose(share, np.sin(8 * angles), atol=1e-9)
 
 
-FRICTION = {"rail": {"friction": 3.0, "damping": 0.0}, "friction": 0.4, "damping": 0.0}
-
-
 def test_stiction_holds_up_to_its_share_of_friction():
-    robots = [
-        with_reality(with_joints(CAD, **FRICTION), **both(stiction=s)) for s in (1.0, 1.5, 1.5)
-    ]
+    robot = with_joints(CAD, friction=0.4, damping=0.0)
+    robots = [with_reality(robot, **both(stiction=share)) for share in (1.0, 1.5, 1.5)]
     legs = hanging(CAD, 3, robots=robots)
     for _ in range(20):
         legs.step(np.array([[0.55, 0.0], [0.55, 0.0], [0.65, 0.0]]))
