@@ -80,14 +80,17 @@ def test_a_hip_that_turns_the_other_way_never_hops(emulated, tmp_path, homed):
     assert abs(event["squat"]["sideways"]) > 0.2
 
 
-def test_healthy_drives_pass_every_check_and_say_who_they_are(emulated):
-    lockstep = emulated()
+@pytest.mark.parametrize("lost", [0, 5])
+def test_healthy_drives_pass_every_check_also_where_answers_are_lost(emulated, lost):
+    lossy = (Fault("drop_reply", since="start", at=0.002 + 0.007 * k) for k in range(lost))
+    lockstep = emulated(faults=tuple(lossy))
     facts = inspect(lockstep.link)
     findings = check_drives(LEG, LIMITS, facts)
     require_fit(findings)
     assert {f.joint for f in findings} == {0, 1}
     assert len(findings) == 2 * 14
     assert facts[0].serial != facts[1].serial
+    assert len(lockstep.robot.fault_injector.log) == lost
     np.testing.assert_allclose([f.position for f in facts], lockstep.robot.leg.q, atol=1e-3)
 
 
@@ -110,13 +113,6 @@ def test_a_drive_that_is_not_fit_is_refused_with_the_reason(emulated, start, wor
     assert any(words in complaint for complaint in complaints), complaints
     with pytest.raises(HardwareError, match="Not armed"):
         require_fit(findings)
-
-
-def test_what_is_asked_of_a_drive_is_asked_again_where_an_answer_is_lost(emulated):
-    lost = [Fault("drop_reply", since="start", at=0.002 + 0.007 * k) for k in range(5)]
-    lockstep = emulated(faults=tuple(lost))
-    require_fit(check_drives(LEG, LIMITS, inspect(lockstep.link)))
-    assert len(lockstep.robot.fault_injector.log) == len(lost)
 
 
 def test_configuring_and_homing_make_a_delivered_drive_fit(emulated):

@@ -158,13 +158,13 @@ def test_a_run_is_exactly_repeatable():
 
 
 def test_a_link_has_one_emulator(tmp_path):
-    config = EmulatorConfig(link=tmp_path / "leg")
-    with EmulatorProcess(config) as first:
-        with pytest.raises(UsageError, match="leg is in use by another process"):
-            EmulatorProcess(config)
-        assert first.path.exists()
-    with EmulatorProcess(config) as second:
-        assert second.path.exists()
+    link = tmp_path / "leg"
+    first = PtyPort(link)
+    with pytest.raises(UsageError, match="leg is in use by another process"):
+        PtyPort(link)
+    assert link.exists()
+    first.close()
+    PtyPort(link).close()
 
 
 def test_a_computer_that_is_late_stops_the_leg_but_no_drives_clock():

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.errors import UsageError
 from hopping_leg.robot import dynamics, kinematics
 from hopping_leg.robot.parameters import Robot
 
@@ -78,9 +77,6 @@ class SoftLimits:
     0.2 or more on samples that are one tick late, and is stable on those that are two late. With
     20 N m/rad a hip would ring without end at one tick; more than 0.15 N m s/rad shakes the shank
     of legv2-paper, whose armature is small.
-
-    Raises:
-        UsageError: A value is negative.
     """
 
     stiffness: float = 8.0
@@ -91,10 +87,3 @@ class SoftLimits:
     """How far inside the limit the PD aims, rad."""
     replace: bool = False
     """Replace the controller's torque while outside, as printed, instead of adding to it."""
-
-    def __post_init__(self) -> None:
-        for name in ("stiffness", "damping", "inset"):
-            value = getattr(self, name)
-            if not 0 <= value < float("inf"):
-                valid = "must be zero or more and finite"
-                raise UsageError(f"'{name}' of the soft limits is {value} but {valid}.")
