@@ -37,19 +37,15 @@ def test_the_hotter_motor_limits_and_the_rated_torque_never_does(robot):
     assert (geared.rms_hip_torque_nm, geared.rms_knee_torque_nm) == (0, np.sqrt(2) * rated * 2)
 
 
-def test_windings_lose_what_the_drive_would_say(robot):
-    load = motor_load([torque(robot, 6.0, 0.0)], robot)
-    current = 6.0 / (6 * 0.0788)
-    assert load.mean_electrical_power_w == pytest.approx(1.5 * current**2 * 0.150)
-    assert load.mean_power_w == 0
-
-
 def test_power_of_motors_and_bus(robot):
     half = np.where(np.arange(TICKS) < 100, 30.0, -10.0)
     load = motor_load([part(robot, hip_power=half, knee_power=-5.0, least_power=-42.0)], robot)
     assert load.mean_power_w == pytest.approx(15)
     assert load.mean_electrical_power_w == pytest.approx(10 - 5)
     assert load.peak_regeneration_w == 42
+    load, current = motor_load([torque(robot, 6.0, 0.0)], robot), 6.0 / (6 * 0.0788)
+    assert load.mean_electrical_power_w == pytest.approx(1.5 * current**2 * 0.150), "windings"
+    assert load.mean_power_w == 0
 
 
 def test_the_bus_rises_by_what_is_not_used_up(robot):

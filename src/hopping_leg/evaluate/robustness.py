@@ -27,9 +27,6 @@ SCHEMA = 2
 TOLERANCE = 0.02
 """Largest magnitude of the median apex minus the command in a successful trial, m."""
 
-OVERALL = "overall"
-"""Row of the mean over all axes."""
-
 JOINT_POINTS = 4
 """Points of the hypercube per command and seed."""
 
@@ -245,8 +242,8 @@ def score_rows(
     """
     every = pl.concat([found.with_columns(axis=pl.lit(name)) for name, found in outcomes.items()])
     success, rows = pl.col("success").mean(), []
-    for name in (*outcomes, OVERALL):
-        trials = every if name == OVERALL else every.filter(axis=name)
+    for name in (*outcomes, "overall"):
+        trials = every if name == "overall" else every.filter(axis=name)
         levels = trials.group_by("repeat", "axis", "level").agg(success)
         axes = levels.group_by("repeat", "axis").agg(success)
         scores = axes.group_by("repeat").agg(success).sort("repeat")["success"].to_numpy()

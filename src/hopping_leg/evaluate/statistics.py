@@ -18,8 +18,6 @@ from hopping_leg.arrays import Array
 _TAILS = (2.5, 97.5)  # of a 95 % interval, percent
 RESAMPLES = 1000
 
-Interval = tuple[float, float]
-
 
 def of(statistic: Callable[[Array], Any], values: Array) -> float:
     """Return a statistic of values, NaN where there are none."""
@@ -46,7 +44,7 @@ def bootstrap(
     return interval
 
 
-def median_interval(runs: Sequence[Array], seed: int, least: int = 2) -> Interval:
+def median_interval(runs: Sequence[Array], seed: int, least: int = 2) -> tuple[float, float]:
     """Return the bootstrap interval of the median over all values, runs, (values,), resampled."""
     filled = [run for run in runs if len(run)]
     if not filled:
@@ -55,7 +53,7 @@ def median_interval(runs: Sequence[Array], seed: int, least: int = 2) -> Interva
     return float(low), float(high)
 
 
-def share_interval(scores: Array, seed: int) -> Interval:
+def share_interval(scores: Array, seed: int) -> tuple[float, float]:
     """Return the 95 % interval of a mean score, given one per realisation, 0 to 1, (n,).
 
     It is a Bayesian bootstrap: realisations get random weights, beside Jeffreys' half a success and
@@ -111,23 +109,19 @@ def compare(
     both = np.concatenate([below, above])
     between = (both >= above.min()) & (both <= below.max())
     deltas = [cliffs_delta(*pair) for pair in pairs]
+    scores = [stats.ranksums(b, a).statistic for a, b in pairs]  # normal, direction kept
     low, high = bootstrap(deltas, np.mean, seed)
     return Neighbours(
         lower_m=lower_m,
         upper_m=upper_m,
         runs=len(pairs),
-        p=stouffer([stats.ranksums(b, a).statistic for a, b in pairs]),
+        p=float(2 * stats.norm.sf(abs(np.sum(scores)) / math.sqrt(len(scores)))),
         cliffs_delta=float(np.mean(deltas)),
         cliffs_delta_low=float(low),
         cliffs_delta_high=float(high),
         overlap=float(between.mean()),
         pooled_p=float(stats.ranksums(above, below).pvalue),
     )
-
-
-def stouffer(scores: Sequence[float]) -> float:
-    """Return the two-sided p-value of independent tests' normal scores, direction kept."""
-    return float(2 * stats.norm.sf(abs(np.sum(scores)) / math.sqrt(len(scores))))
 
 
 def cliffs_delta(lower: Array, upper: Array) -> float:
