@@ -88,8 +88,8 @@ class Still:
 
     name = "still"
 
-    def __init__(self, torque=(0.0, 0.0), fail_after=None):
-        self.torque, self.fail_after, self.calls = np.array([torque]), fail_after, 0
+    def __init__(self, torque=(0.0, 0.0)):
+        self.torque, self.calls = np.array([torque]), 0
         self.ages = []
 
     def reset(self, count):
@@ -98,8 +98,6 @@ class Still:
     def act(self, measurement):
         self.calls += 1
         self.ages.append(measurement.age[0])
-        if self.fail_after is not None and self.calls > self.fail_after:
-            raise ArithmeticError("lost the thread")
         return self.torque
 
     def internals(self):

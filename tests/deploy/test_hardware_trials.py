@@ -286,7 +286,9 @@ def test_a_trace_that_cannot_be_written_names_the_stop_and_the_next_command(tmp_
         raise TraceError("Cannot write it: No space left on device.")
 
     monkeypatch.setattr(Trace, "save", full)
-    _, _, run = fake_run(tmp_path, Still(fail_after=20))
+    controller = Still()
+    controller.act = lambda measurement: 1 / 0
+    _, _, run = fake_run(tmp_path, controller)
     with pytest.raises(TraceError, match=r"raised an error.*No space.*blackbox` writes"):
         run()
     assert recover(tmp_path / "run.blackbox").table.height > 50
