@@ -9,7 +9,7 @@ import pytest
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.energy_shaping.gains import GainFile, load_gains, scale_gains
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import DEFAULT_ROBOT, load_robot
+from hopping_leg.robot import load_robot
 from studies.energy_shaping import run as module
 from studies.energy_shaping import tune
 from studies.energy_shaping.run import COMMANDS, RANGE, Baseline, cases
@@ -21,25 +21,20 @@ GAINS = load_gains().gains
 SETUP = RolloutConfig(ROBOT, threads=1)
 
 
-def test_every_case_is_another():
-    found = cases(load_robot(DEFAULT_ROBOT))
-    told = {
-        (repr(c.controller.gains), type(c.controller), c.controller.period, c.robot.digest,
-         c.disturbance, tuple(c.commands)) for c in found
-    }  # fmt: skip
-    assert len({case.name for case in found}) == len(told) == len(found)
-
-
-def test_the_law_itself_meets_the_commands_and_a_push_until_contact_is_lost_does_not(monkeypatch):
-    names = ("paper, true contact and height", "paper, push until contact is lost")
+def test_the_law_itself_meets_the_commands_and_estimates_are_calibrated(monkeypatch):
+    names = ("paper, true contact and height", "paper, push until contact is lost", "tuned")
     some = [case for case in cases(ROBOT) if case.name in names]
     monkeypatch.setattr(module, "cases", lambda _: some)
     found = Baseline(ROBOT.name, runs=2, duration=4.0).measure()
-    law, late = found["cases"]
+    law, late, _ = (next(c for c in found["cases"] if c["case"] == name) for name in names)
     assert law["worst_median_error_m"] < 0.002
     assert law["skipped_hops"] == 0
     assert late["mean_abs_median_error_m"] > 3 * law["mean_abs_median_error_m"]
-    assert [row["command_m"] for row in found["commands"]] == [*COMMANDS, *COMMANDS]
+    heights = [row["command_m"] for row in found["commands"]]
+    assert sorted(heights) == sorted([*COMMANDS, *COMMANDS, *RANGE])
+    used, raw, _ = found["estimators"]
+    assert used["estimate"] == "as used"
+    assert abs(used["mean_m"]) < abs(raw["mean_m"])
 
 
 def test_errors_are_those_of_the_papers_heights_and_faults_those_of_all():

@@ -31,9 +31,9 @@ def both(**numbers):
     return {"hip": DriveMismatch(**numbers), "knee": DriveMismatch(**numbers)}
 
 
-def without_friction(robot, *, damping=False):
-    """Return a robot whose rail and joints have no Coulomb friction, and damping only if asked."""
-    none = {"friction": 0.0} if damping else {"friction": 0.0, "damping": 0.0}
+def without_friction(robot):
+    """Return a robot whose rail and joints have neither friction nor damping."""
+    none = {"friction": 0.0, "damping": 0.0}
     return with_joints(robot, rail=none, **none)
 
 

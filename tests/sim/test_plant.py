@@ -15,9 +15,9 @@ OUTSIDE = np.array([1.5, -2.5])
 COUNT = 64
 
 
-def plant(soft_limits, disturbance, robot=ROBOT):
+def plant(soft_limits, disturbance):
     """Return legs in the air, hip and knee beyond their soft limits and turning."""
-    legs = LegSimulator(robot, COUNT, threads=1)
+    legs = LegSimulator(ROBOT, COUNT, threads=1)
     made = Plant(legs, disturbance, soft_limits, np.random.default_rng(0))
     legs.place(slice(None), 5.0, OUTSIDE)
     made.channel.restart(slice(None), legs.q, legs.qd, np.zeros(COUNT))
@@ -42,11 +42,10 @@ def test_soft_limits_act_on_the_sample_that_the_controllers_saw(replace):
 def test_what_soft_limits_add_is_noisy_and_limited_with_the_rest():
     noise = NoiseAndDelay(joint_noise=0.0, torque_noise=0.15, delay_probability=0.0)
     torque = np.full((COUNT, 2), -9.0)
-    made = plant(SoftLimits(stiffness=100.0), noise)
-    made.sense(np.zeros(COUNT))
+    made, by_hand = plant(SoftLimits(stiffness=100.0), noise), plant(None, noise)
+    for one in (made, by_hand):
+        one.sense(np.zeros(COUNT))
     given = made.drive(torque)
-    by_hand = plant(None, noise)
-    by_hand.sense(np.zeros(COUNT))
     np.testing.assert_array_equal(by_hand.drive(torque + made.soft_limit_torque), given)
     assert (np.abs(made.soft_limit_torque) > 1).all()
     assert (np.abs(given) <= ROBOT.of_joints("torque_limit")).all()
