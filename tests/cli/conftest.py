@@ -21,10 +21,12 @@ def refused(capsys):
 
     def call(words, sentence):
         try:
-            code = main([str(word) for word in words])
+            code, begins = main([str(word) for word in words]), "hop: "
         except SystemExit as ended:  # of what parses the words
-            code = ended.code
+            code, begins = ended.code, ""
+        said = capsys.readouterr().err
         assert code == FAILED
-        assert sentence in " ".join(capsys.readouterr().err.replace("\u2502", "").split())
+        assert said.splitlines()[-1].startswith(begins)
+        assert sentence in " ".join(said.replace("\u2502", "").split())
 
     return call

@@ -11,7 +11,6 @@ import pytest
 
 from hopping_leg.cli import main
 from hopping_leg.controllers.joint_pd import JointGains
-from hopping_leg.controllers.registry import load_policy
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.identify.excitation import load_excitation
 from hopping_leg.identify.recording import load_recording
@@ -19,7 +18,6 @@ from hopping_leg.robot import DEFAULT_ROBOT
 from hopping_leg.trace import Trace
 from tests.cli.emulated import put_behind, write_sine
 
-FAST = load_policy("fast").card
 RUN = ["deploy", "energy-shaping", "--transport", "/dev/leg", "--seconds", "0.3"]
 
 
@@ -70,26 +68,6 @@ def test_a_fault_is_a_sentence_and_an_exit_code(emulate, tmp_path, refused):
     emulate(faults=(Fault("drive_fault", at=0.6, drive="hip", value=33),))
     refused([*RUN, "--yes", "--out", tmp_path], "hip: fault 33 (motor driver)")
     assert len(list(tmp_path.glob("*.parquet"))) == 1
-
-
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["fasst"], "Did you mean 'fast'"),
-        (["fast", "--command", "0.6"], f"from {FAST.command_low:.2f} to {FAST.command_high:.2f} m"),
-        (["fast", "--robot", "legv2"], f"was trained on robot '{FAST.robot}'"),
-        (["energy-shaping", "--schedule", "0.3"], "is no step of a schedule"),
-        (["energy-shaping", "--schedule", "0.3:2", "--command", "0.3"], "exclude each other"),
-        (["energy-shaping", "--seconds", "-1"], "--seconds is -1"),
-        (["energy-shaping"], "add --yes"),
-    ],
-)
-def test_bad_input_is_refused_before_anything_is_armed(emulate, tmp_path, refused, words, sentence):
-    lockstep = emulate()
-    out = tmp_path / "out"
-    refused(["deploy", *words, "--transport", "/dev/leg", "--out", out], sentence)
-    assert lockstep.robot.held
-    assert not out.exists()
 
 
 def test_doctor_says_what_is_wrong_and_puts_it_right(emulate, capsys):
@@ -163,22 +141,6 @@ def test_the_emulator_tells_faults_and_changes_of_mode(tmp_path, capsys):
     assert "fault: a joint's angle is wrong from now on (hip)" in capsys.readouterr().out
 
 
-EMULATE, TRANSPORT = ["emulate", "--seconds", "0"], ["doctor", "--transport"]
-
-
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        ([*EMULATE, "--start-pose", "x"], "There is no pose 'x'"),
-        ([*EMULATE, "--faults", "none.toml"], "Cannot read the fault script none.toml"),
-        ([*TRANSPORT, "/none/port"], "There is no serial port /none/port"),
-        ([*TRANSPORT, "socketcn:can0"], "python-can has no interface 'socketcn'"),
-    ],
-)
-def test_a_wrong_option_or_transport_is_one_sentence(refused, words, sentence):
-    refused(words, sentence)
-
-
 @pytest.mark.parametrize("rig", ["fixed-base", "rail"])
 def test_a_recording_holds_what_was_played_and_measured(tmp_path, rig):
     file, played = write_sine(tmp_path, rig, 300)
@@ -207,22 +169,6 @@ def test_a_recording_holds_what_was_played_and_measured(tmp_path, rig):
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
     assert recording.array("torque")[1:].std() > 0.1
     assert recording.has_column("height_m") == (played.rig == "rail")
-
-
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["play"], "No excitation was given"),
-        (["play", "sine.parquet", "--believed", "legv9"], "There is no robot 'legv9'"),
-        (["play", "sine.parquet", "--damping", "-1", "0"], "must be zero or more"),
-        (["fixed-base", "--no-adapt"], "cannot follow the trajectory"),
-    ],
-)
-def test_what_cannot_be_recorded_is_one_sentence(tmp_path, monkeypatch, refused, words, sentence):
-    monkeypatch.chdir(tmp_path)
-    write_sine(tmp_path, "rail", 300)
-    refused(["record", *words, "--out", "out"], sentence)
-    assert not Path("out").exists()
 
 
 @pytest.mark.parametrize(

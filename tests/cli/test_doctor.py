@@ -2,15 +2,7 @@ import pytest
 
 from tests.extras import TRAINING, run_without
 
-
-def test_drives_cannot_be_changed_without_a_transport(refused):
-    refused(["doctor", "--write"], "name their --transport")
-
-
-OPTIONAL = [
-    *(*TRAINING, "ray"),
-    *("moteus", "can", "serial", "viser", "playwright"),
-]
+OPTIONAL = [*TRAINING, "ray", "moteus", "can", "serial", "viser", "playwright", "mcap", "mcap_ros2"]
 HARDWARE = "pip install 'hopping-leg[hardware]'"
 
 
@@ -20,6 +12,7 @@ HARDWARE = "pip install 'hopping-leg[hardware]'"
         (["doctor"], 0, "compiled code: "),
         (["emulate", "--kinds"], 0, "late_reply"),
         (["train"], 2, "pip install 'hopping-leg[train]'"),
+        (["export", "traces", "run.parquet"], 2, "pip install 'hopping-leg[ros]'"),
         (["emulate"], 2, HARDWARE),
         (["doctor", "--transport", "/dev/null"], 2, HARDWARE),
         (["deploy", "energy-shaping", "--transport", "/dev/null"], 2, HARDWARE),

@@ -1,6 +1,5 @@
 import dataclasses
 import json
-import shutil
 
 import pytest
 
@@ -33,20 +32,6 @@ def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys)
     words = ["report", "--out", str(figures)]
     assert main([*words, "--format", "png", *map(str, traces)]) == 0
     assert {"heights.png", "ladder.png"} <= {path.name for path in figures.iterdir()}
-
-
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["--commands", "0.5"], "trained for 0.29 to 0.31 m"),
-        (["--commands", "high"], "--commands"),
-        (["--seed", "-1"], "--seed is -1"),
-        (["--threads", "-1"], "'threads' is -1"),
-        (["--timestep", "0.003"], "does not divide"),
-    ],
-)
-def test_bad_input_is_one_sentence(spring, refused, words, sentence):
-    refused(["evaluate", "spring", *words], sentence)
 
 
 def test_robustness_leaves_numbers_and_figure(spring, tmp_path, capsys):
@@ -106,10 +91,3 @@ def test_a_policy_is_judged_on_the_robot_that_lies_beside_it(tmp_path, monkeypat
     assert said.index("was trained on robot 'my-leg'") < said.index("soft floor")
     (folder / ROBOT_FILE).unlink()
     assert robot_of([str(file)]) == DEFAULT_ROBOT
-
-
-@pytest.mark.parametrize("verb", [["evaluate"], ["view", "--no-browser", "--seconds", "0"]])
-def test_a_robot_file_is_no_controller_and_is_said_to_be_none(verb, tmp_path, refused):
-    file = tmp_path / "my leg's.toml"
-    shutil.copy(ROOT / "examples/my_leg.toml", file)
-    refused([*verb, file], "is a robot file, no controller; give it with --robot")

@@ -12,7 +12,7 @@ from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.play_excitation import play
 from hopping_leg.robot import load_robot
 from tests.identify.fitting import TRUTH, TWIN, run
-from tests.identify.runs import SIDECAR, swinging, write_run
+from tests.identify.runs import SIDECAR, write_run
 from tests.identify.twin import swing
 
 FEW = ["--parameters", ",".join(TRUTH), "--search", "cma", "--population", "4"]
@@ -80,49 +80,6 @@ def test_a_fit_that_is_worse_than_its_start_fails_and_every_file_says_so(
     said = capsys.readouterr()
     assert said.out.index("do not use it") < said.out.index("95 % interval")
     assert "do not use it" in said.err
-
-
-def write_bad(folder):
-    """Write recordings with something wrong each."""
-    (folder / "empty.csv").touch()
-    write_run(folder, swinging(100), name="short.csv")
-    rest = swinging().with_columns(hip_position_rad=pl.lit(0.3), knee_position_rad=pl.lit(-1.2))
-    write_run(folder, rest.drop("hip_velocity_rad_s", "knee_velocity_rad_s"), name="rest.csv")
-    gains = "stiffness = [8.0, 8.0]\ndamping = [0.3, 0.3]\n"
-    sidecar = SIDECAR + 'onboard = "zoh"\n' + gains
-    write_run(folder, swinging(1600), sidecar, name="good.csv")
-    other = sidecar.replace("legv2", "legv1")
-    write_run(folder, swinging(1600), other, name="other.csv")
-
-
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        ([], "No recording was named"),
-        (["empty.csv"], "empty.csv is no whole table"),
-        (["short.csv"], "short.csv is too short"),
-        (["rest.csv"], "is at rest"),
-        (["good.csv", "other.csv"], "belong to several robots (legv2, legv1)"),
-        (["good.csv", "--validate", "good.csv"], "use each for one of the two"),
-        (["good.csv", "--robot", "legv1"], "another leg's robot file"),
-        (["good.csv", "--parameters", "hip.frction"], "Did you mean 'hip.friction'"),
-        (["good.csv", "--search", "cmaes"], "Did you mean 'cma'"),
-        (["good.csv", "--bounds", "hip.friction=low,high"], "gives no bounds"),
-        (["good.csv", "--generations", "0"], "CMA-ES needs a generation"),
-        (["good.csv", "--json", "good.toml"], "is an input"),
-        (["good.csv", "--out", "leg.json"], "must end in .toml"),
-        (["good.csv", "--out", "good.toml"], "is an input"),
-    ],
-)
-def test_bad_input_is_one_sentence_and_overwrites_nothing(words, sentence, tmp_path, refused):
-    write_bad(tmp_path)
-    (tmp_path / "leg.toml").write_text("old")
-    before = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
-    files = (".csv", ".parquet", ".toml", ".json", ".")
-    given = [tmp_path / w if w.endswith(files) else w for w in words]
-    out = [] if "--out" in words else ["--out", tmp_path / "leg.toml"]
-    refused(["identify", *given, *out], sentence)
-    assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before, "no new folder either"
 
 
 def test_warnings_of_recordings_are_shown(tmp_path, capsys):

@@ -6,6 +6,7 @@ import sys
 import time
 from dataclasses import dataclass
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 import tyro
@@ -24,11 +25,11 @@ class Nothing:
     depth: int = 1
 
 
-def failing(monkeypatch, error):
-    """Make `hop robots` raise."""
+def calling(monkeypatch, action):
+    """Call `hop robots`, which does something else."""
 
     def run(args: Nothing) -> None:
-        raise error
+        action()
 
     monkeypatch.setattr(cli.importlib, "import_module", lambda _: SimpleNamespace(run=run))
     return main(["robots"])
@@ -51,23 +52,6 @@ def test_help_loads_nothing_heavy():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        (["robot"], "Did you mean 'robots'?"),
-        (["robots", "show", "legv3"], "There is no robot 'legv3'."),
-        (["export", "policy", "LICENSE"], "not a policy file"),
-        (["export", "urdf", "--out", "/dev/full"], "No space left on device"),
-    ],
-)
-def test_bad_input_is_one_sentence_and_exit_code_2(capsys, arguments, sentence):
-    assert main(arguments) == 2
-    captured = capsys.readouterr()
-    assert sentence in captured.err
-    assert captured.err.startswith("hop: ")
-    assert captured.err.count("\n") == 1
-
-
-@pytest.mark.parametrize(
     ("error", "code", "sentence"),
     [
         (UsageError("Too high; 0.4 m was valid."), 2, "hop: Too high; 0.4 m was valid.\n"),
@@ -77,29 +61,15 @@ def test_bad_input_is_one_sentence_and_exit_code_2(capsys, arguments, sentence):
     ],
 )
 def test_errors_become_sentences(monkeypatch, capsys, error, code, sentence):
-    assert failing(monkeypatch, error) == code
+    assert calling(monkeypatch, Mock(side_effect=error)) == code
     assert sentence in capsys.readouterr().err
 
 
 def test_a_bug_keeps_its_traceback(monkeypatch):
-    with pytest.raises(ZeroDivisionError):
-        failing(monkeypatch, ZeroDivisionError())
-    with pytest.raises(ModuleNotFoundError):
-        failing(monkeypatch, ModuleNotFoundError("no such thing", name="hopping_leg.nothing"))
-
-
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["evaluat"], "Did you mean 'evaluate'?"),
-        (["train", "--sed", "3"], "--seed"),
-        (["deploy", "fast"], "--transport"),
-        (["robots", "check", "examples/my_log.toml"], "Or give a .toml file"),
-        (["evaluate", "leg.urdf"], "make a robot file of it: hop robots import leg.urdf."),
-    ],
-)
-def test_wrong_usage_is_said(refused, words, sentence):
-    refused(words, sentence)
+    nothing = ModuleNotFoundError("no such thing", name="hopping_leg.nothing")
+    for error in (ZeroDivisionError(), nothing):
+        with pytest.raises(type(error)):
+            calling(monkeypatch, Mock(side_effect=error))
 
 
 @dataclass(frozen=True)
@@ -126,12 +96,6 @@ def test_every_verb_has_help(capsys, verb):
     assert "Examples:" in shown
 
 
-def test_list_names_every_shipped_robot(capsys):
-    assert main(["robots", "list"]) == 0
-    shown = capsys.readouterr().out
-    assert all(name in shown for name in shipped_robots())
-
-
 @pytest.mark.parametrize("name", shipped_robots())
 def test_show_gives_every_number_with_unit_and_source(capsys, name):
     assert main(["robots", "show", name]) == 0
@@ -143,11 +107,8 @@ def test_show_gives_every_number_with_unit_and_source(capsys, name):
         assert f"{entry['value']:g}" in line
         assert entry["source"] in line
     assert load_robot(name).digest in shown
-
-
-def test_check_accepts_the_example(capsys):
-    assert main(["robots", "check", "examples/my_leg.toml"]) == 0
-    assert "valid robot: my-leg" in capsys.readouterr().out
+    assert main(["robots", "list"]) == 0
+    assert name in capsys.readouterr().out
 
 
 def test_urdf_is_written_to_a_file_or_printed(tmp_path, capsys):
@@ -157,21 +118,13 @@ def test_urdf_is_written_to_a_file_or_printed(tmp_path, capsys):
     assert file.read_text() in capsys.readouterr().out
 
 
-def hop(words, folder, **environment):
-    """Run `hop` in a process of its own, in a folder that is its temporary one, too."""
-    return subprocess.run(
-        [sys.executable, "-m", "hopping_leg.cli", *words],
-        capture_output=True,
-        cwd=folder,
-        env={**os.environ, "TMPDIR": str(folder), **environment},
-    )
-
-
 def test_what_a_terminal_cannot_encode_is_replaced(tmp_path):
     folder = tmp_path / "\u03c4"
     folder.mkdir()
-    words = ["export", "policy", "fast", "--out", str(folder / "fast.onnx")]
-    done = hop(words, tmp_path, PYTHONIOENCODING="ascii")
+    words = [sys.executable, "-m", "hopping_leg.cli", "export", "policy", "fast", "--out"]
+    environment = {**os.environ, "TMPDIR": str(tmp_path), "PYTHONIOENCODING": "ascii"}
+    words.append(str(folder / "fast.onnx"))
+    done = subprocess.run(words, capture_output=True, cwd=tmp_path, env=environment)
     assert done.returncode == 0, done.stderr
     assert f"Wrote {tmp_path}/?/fast.onnx" in done.stdout.decode("ascii")
     assert sorted(path.name for path in tmp_path.iterdir()) == [folder.name], "onnxruntime, mujoco"
@@ -189,12 +142,11 @@ def test_mujoco_writes_no_log_into_the_users_folder(tmp_path):
 
 
 def test_sigterm_ends_a_verb_as_ctrl_c_does(monkeypatch):
-    def run(args: Nothing) -> None:
+    def wait():
         os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(10)
 
-    monkeypatch.setattr(cli.importlib, "import_module", lambda _: SimpleNamespace(run=run))
-    assert main(["robots"]) == cli.INTERRUPTED
+    assert calling(monkeypatch, wait) == cli.INTERRUPTED
 
 
 @given(st.text() | st.binary().map(lambda data: data.decode(errors="surrogateescape")))

@@ -33,32 +33,6 @@ def test_a_training_leaves_policy_card_and_json(tiny, tmp_path, capsys, refused)
     refused(arguments, "--resume")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (["--recipe", "slow"], "There is no recipe 'slow'"),
-        (["--minutes", "-1"], "must be positive"),
-        (["--steps", "0"], "must be 1 or more"),
-        (["--set", "learning_rat=1"], "Did you mean 'learning_rate'"),
-        (["--set", "learning_rate=fast"], "give e.g. learning_rate="),
-        (["--recipe", "paper", "--set", "reward.speed=3"], "reward.height"),
-        (["--heights", "0.4", "0.2"], "the smaller first"),
-        (["--observation", "dates"], "dated, dated-long"),
-        (["--robot", "twin"], "has effects in [reality] that training does not know"),
-    ],
-)
-def test_bad_input_is_a_sentence_and_writes_nothing(arguments, says, tmp_path, refused):
-    out = tmp_path / "run"
-    refused(["train", "--out", out, *arguments], says)
-    assert not out.exists()
-
-
-def test_a_folder_with_other_things_is_left_alone(tmp_path, refused):
-    (tmp_path / "thesis.tex").write_text("years of work")
-    refused(["train", "--out", tmp_path], "holds no run")
-    assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
-
-
 def test_a_full_disk_leaves_no_half_checkpoint_and_names_the_next_command(
     tiny, tmp_path, refused, monkeypatch
 ):

@@ -9,20 +9,6 @@ import pytest
 pytest.importorskip("viser", reason="the extra 'view' is not installed")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        (["nobody"], "There is no controller 'nobody'"),
-        (["fast", "paper", "fast"], "give one, or two side by side"),
-        (["--box", "none"], "There is no none"),
-        (["--trace", "a.parquet", "--box", "runs"], "exclude each other"),
-        (["--port", "70000"], "between 0 and 65535"),
-    ],
-)
-def test_a_bad_wish_gets_a_sentence(arguments, sentence, refused):
-    refused(["view", "--seconds", "0", "--no-browser", *arguments], sentence)
-
-
 @pytest.mark.slow
 def test_the_page_is_served_on_this_computer_alone_and_a_taken_port_gives_the_next():
     with socket.socket() as taken:

@@ -71,9 +71,9 @@ def hop(*words: object) -> None:
     assert code == 0, e.getvalue()
 
 
-def hopped(robot: str, seconds: float, *, keep=lambda m: None, **options: object) -> Values:
+def hopped(robot: str, seconds: float, *, keep=lambda m: None) -> Values:
     """Return what energy shaping did on three legs whose commands change half-way."""
-    config = RolloutConfig(load_robot(robot), threads=1, **options)
+    config = RolloutConfig(load_robot(robot), threads=1)
     scale = config.standing_length / 0.2
     commands = scale * np.tile([0.25, 0.30, 0.35], (round(seconds * config.rate), 1))
     commands[len(commands) // 2 :] = commands[0, ::-1]
@@ -265,9 +265,10 @@ def _deployed(folder: Path, controller: str, robot: str) -> Values:
     """Return every byte between host and emulated drives in virtual time, and the trace."""
     with pytest.MonkeyPatch.context() as patch, _wire() as frames:
         lockstep = put_behind(patch, robot=robot, seed=4)
-        words = ["--schedule", "0.25:0.2,0.3:0.3", "--yes", "--out", folder / "run"]
-        words += ["--robot", robot]
-        hop("deploy", controller, "--transport", "/dev/leg", "--seconds", "0.5", *words)
+        hop(
+            "deploy", controller, "--transport", "/dev/leg", "--robot", robot, "--seconds", "0.5",
+            "--schedule", "0.25:0.2,0.3:0.3", "--yes", "--out", folder / "run",
+        )  # fmt: skip
     (trace,) = (folder / "run").glob("*.parquet")
     assert len(frames) > 1000
     wire = np.frombuffer(b"".join(frames), np.uint8)
