@@ -37,13 +37,6 @@ def blocks(page: str) -> list[Block]:
     return [Block(*found.groups()) for found in _BLOCK.finditer(text_of(page))]
 
 
-def prose(page: str) -> list[str]:
-    """Return a page's headings, paragraphs, entries of lists and cells of tables as plain text."""
-    text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", _BLOCK.sub("", text_of(page)))
-    parts = re.split(r"\n\s*\n|\n(?=[-|#:]|\d\.)|\|", text)
-    return [part for part in parts if re.search(r"\w", part)]
-
-
 def inline_commands(page: str) -> list[list[str]]:
     """Return what stands in running text as `hop ...`; files and values may be left open there."""
     return [words.split() for words in _INLINE.findall(text_of(page))]

@@ -16,27 +16,25 @@ from hopping_leg.trace import Trace
 from tests.doc_pages import ROOT, blocks
 
 SHORTER = {
-    "hop demo": {"--no-browser": None, "--port": "0", "--seconds": "0.5"},
-    "hop deploy": {"--seconds": "0.3", "--yes": None},
-    "hop doctor --home": {"--yes": None},
-    "hop doctor --write": {"--yes": None},
-    "hop emulate": {"--seconds": "0.3", "--no-realtime": None},
-    "hop evaluate": {"--seeds": "1", "--commands": "0.3", "--floor": "soft", "--no-video": None},
-    "hop record fixed-base": {
-        "--amplitudes": "0.05", "--periods": "0.5", "--swings": "10", "--duration": "10",
-    },
-    "hop record moving-base": {"--amplitudes": "0.05", "--periods": "0.5", "--duration": "10"},
-    "hop record multisine": {"--duration": "10"},
-    "hop identify": {"--parameters": "hip.friction,knee.friction"},
-    "hop record play --transport": {"--yes": None},
-    "hop train": {"--steps": "1", "--heights": "0.28 0.32"},
-    "hop train --recipe universal": {
-        "--steps": "1", "--heights": "0.28 0.32", "--set": "num_envs=64 batch_size=1024",
-    },
-    "hop view": {"--no-browser": None, "--port": "0", "--seconds": "0.5"},
-}  # fmt: skip
-"""Options that replace or join those of every command with these words; of several entries the one
-with the most words counts."""
+    "hop demo": "--no-browser --port 0 --seconds 0.5",
+    "hop deploy": "--seconds 0.3 --yes",
+    "hop doctor --home": "--yes",
+    "hop doctor --write": "--yes",
+    "hop emulate": "--seconds 0.3 --no-realtime",
+    "hop evaluate": "--seeds 1 --commands 0.3 --floor soft --no-video",
+    "hop record fixed-base": "--amplitudes 0.05 --periods 0.5 --swings 10 --duration 10",
+    "hop record moving-base": "--amplitudes 0.05 --periods 0.5 --duration 10",
+    "hop record multisine": "--duration 10",
+    "hop identify": "--parameters hip.friction,knee.friction",
+    "hop record play --transport": "--yes",
+    "hop train": "--steps 1 --heights 0.28 0.32",
+    "hop train --recipe universal": (
+        "--steps 1 --heights 0.28 0.32 --set num_envs=64 batch_size=1024"
+    ),
+    "hop view": "--no-browser --port 0 --seconds 0.5",
+}
+"""Options added to every command with these words; of several entries the one with the most words
+counts."""
 
 SECONDS = {
     "hopping_leg.evaluate.trials.FIXED_SECONDS": 3.0,
@@ -60,23 +58,10 @@ KILLED = "runs/deploy/fast-20260501-101500.blackbox"
 
 
 def shorten(words: list[str]) -> list[str]:
-    """Return a command with the options that make it short."""
+    """Return a command with the options that make it short; of an option the last one counts."""
     fitting = [key for key in SHORTER if set(key.split()) <= set(words)]
-    if not fitting:
-        return words
-    for flag, value in SHORTER[max(fitting, key=lambda key: len(key.split()))].items():
-        words = [*_without(words, flag), flag, *(value or "").split()]
-    return words
-
-
-def _without(words: list[str], flag: str) -> list[str]:
-    """Return a command without an option and its values."""
-    if flag not in words:
-        return words
-    first = last = words.index(flag)
-    while last + 1 < len(words) and not words[last + 1].startswith("--"):
-        last += 1
-    return [*words[:first], *words[last + 1 :]]
+    added = SHORTER[max(fitting, key=lambda key: len(key.split()))] if fitting else ""
+    return [*words, *added.split()]
 
 
 def furnish(page: str) -> None:
@@ -85,14 +70,15 @@ def furnish(page: str) -> None:
     shutil.copy("examples/my_leg.toml", "my_leg.toml")
     Path("runs/deploy").mkdir(parents=True)
     make = {
-        "deploy": _wired_leg_and_killed_run,
-        "evaluation": _trained_policy,
-        "other-tools": _bag_trial_and_policy,
-        "own-controller": _first_controller,
-        "transfer": lambda: draw_twin(0).save(Path("my_twin.toml")),
-        "viewer": _trial_and_killed_run,
+        "deploy": (_wired_leg, _killed_run),
+        "evaluation": (_trained_policy,),
+        "other-tools": (_bag, _stored_trial, _trained_policy),
+        "own-controller": (_first_controller,),
+        "transfer": (lambda: draw_twin(0).save(Path("my_twin.toml")),),
+        "viewer": (_stored_trial, _killed_run),
     }
-    make.get(page, lambda: None)()
+    for part in make.get(page, ()):
+        part()
 
 
 def _first_controller() -> None:
@@ -106,8 +92,8 @@ def _trained_policy() -> None:
     shutil.copy(ROOT / "src/hopping_leg/policies/fast.onnx", "runs/mine/policy.onnx")
 
 
-def _bag_trial_and_policy() -> None:
-    """Leave what is not made here: a trial, a recording as a bag, and a policy."""
+def _bag() -> None:
+    """Leave a recording that others made."""
     from hopping_leg.formats import to_mcap
     from hopping_leg.identify.excitation import Multisine, make_excitation
     from hopping_leg.identify.play_excitation import play
@@ -117,35 +103,28 @@ def _bag_trial_and_policy() -> None:
     recording.save(Path("bag.parquet"))
     Path("bag.mcap").write_bytes(to_mcap(Trace.load(Path("bag.parquet"))))
     Path("bag.parquet").unlink()
-    _trial().save(Path("run.parquet"))
-    _trained_policy()
 
 
-def _wired_leg_and_killed_run() -> None:
+def _wired_leg() -> None:
     """Write the page's table into the robot file, for drives whose serial number nobody knows."""
-    friction = '{ value = 0.3, unit = "N m", source = "made up" }'
+    friction = 'friction = { value = 0.3, unit = "N m", source = "made up" }'
     Path("real_leg.toml").write_text(
-        f'name = "real-leg"\nextends = "my_leg.toml"\n[hip]\nfriction = {friction}\n'
-        f"[knee]\nfriction = {friction}\n"
+        f'name = "real-leg"\nextends = "my_leg.toml"\n[hip]\n{friction}\n[knee]\n{friction}\n'
     )
     (table,) = [b.text for b in blocks("deploy") if b.text.startswith("[hardware]")]
     table = "".join(line for line in table.splitlines(True) if not line.startswith("serial"))
     with Path("my_leg.toml").open("a") as file:
         file.write(f"\n{table}")
-    _killed_run()
-
-
-def _trial_and_killed_run() -> None:
-    _trial().save(Path("run.parquet"))
-    _killed_run()
 
 
 def _trial() -> Trace:
-    leg = load_robot("legv2-paper")
-    commands = np.full((600, 1), 0.3)
-    return rollout(
-        load_controller("energy-shaping", leg), RolloutConfig(leg), commands, seed=0
-    ).trace(0)
+    leg, commands = load_robot("legv2-paper"), np.full((600, 1), 0.3)
+    controller = load_controller("energy-shaping", leg)
+    return rollout(controller, RolloutConfig(leg), commands, seed=0).trace(0)
+
+
+def _stored_trial() -> None:
+    _trial().save(Path("run.parquet"))
 
 
 def _killed_run() -> None:

@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -34,11 +35,6 @@ WITH_KINDS = ("record", "export", "robots")
 """Verbs whose options depend on the next word."""
 
 
-def test_blocks_of_toml_are_toml():
-    for text in (b.text for page in PAGES for b in blocks(page) if b.language == "toml"):
-        assert tomllib.loads(text)
-
-
 @functools.cache
 def help_of(*words):
     """Return the help of a verb, or of a kind of it where it has kinds."""
@@ -49,7 +45,8 @@ def help_of(*words):
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_options_in_running_text_exist(page):
+def test_options_in_running_text_exist_and_blocks_of_toml_are_toml(page):
+    assert all(tomllib.loads(b.text) for b in blocks(page) if b.language == "toml")
     for _, verb, *words in inline_commands(page):
         if verb != "VERB" and not verb.startswith("-"):
             assert verb in cli.VERBS, words
@@ -102,27 +99,25 @@ def run_hop(words, monkeypatch):
             patch.setattr(module, "run", functools.wraps(module.run)(lambda args: None))
         if "--transport" in words:
             robot = words[words.index("--robot") + 1] if "--robot" in words else robot_of(words)
-            pose, clamped = "zero" if "--home" in words else "stand", "fixed-base.parquet" in words
-            put_behind(
-                patch, robot="real_leg.toml" if clamped else robot, pose=pose, clamped=clamped
-            )
+            clamped = "fixed-base.parquet" in words
+            robot = "real_leg.toml" if clamped else robot
+            pose = "zero" if "--home" in words else "stand"
+            put_behind(patch, robot=robot, pose=pose, clamped=clamped)
         if CODES.get(command) == cli.INTERRUPTED:
-            patch.setattr("hopping_leg.rl.train.Trainer.tick", interrupt)
+            tick = Mock(side_effect=KeyboardInterrupt)
+            patch.setattr("hopping_leg.rl.train.Trainer.tick", tick)
         found = [sorted(map(str, Path().glob(w))) if "*" in w else [w] for w in shorten(words)[1:]]
         code = cli.main([word for some in found for word in some])
     assert code == CODES.get(command, 0), f"{command}: exit code {code}"
 
 
-def interrupt(trainer):
-    raise KeyboardInterrupt
+def parse_only(name, options, arguments):
+    cli.read_options(options, name, None, arguments)
+    return 0
 
 
 def parse_study(words, monkeypatch):
     """Check a study's options without running it."""
-
-    def parse_only(name, options, arguments):
-        cli.read_options(options, name, None, arguments)
-        return 0
 
     with monkeypatch.context() as patch:
         patch.setattr("studies.shared._run", parse_only)

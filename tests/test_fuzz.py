@@ -5,7 +5,6 @@ a process of its own, which may abort: ``python -m tests.test_fuzz KIND COUNT``.
 HOPPING_LEG_FUZZ says how many are tried.
 """
 
-import functools
 import gzip
 import io
 import json
@@ -18,13 +17,30 @@ import subprocess
 import sys
 import tempfile
 import zlib
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
+import onnx
 import polars as pl
 import pytest
 
+from hopping_leg.controllers.energy_shaping.gains import load_gains
+from hopping_leg.controllers.policy import Policy
+from hopping_leg.controllers.registry import load_policy
+from hopping_leg.deploy.flight_recorder import FlightRecorder
+from hopping_leg.emulator.faults import load_faults
 from hopping_leg.errors import HoppingLegError
+from hopping_leg.flight_recording import MAGIC, frame, recover
+from hopping_leg.identify.excitation import Multisine, load_excitation, make_excitation
+from hopping_leg.identify.recording import load_recording
+from hopping_leg.robot import build_model, get_spec, load_robot, to_urdf
+from hopping_leg.robot.importing import imported_robot
+from hopping_leg.robot.planar_leg import read_leg
+from hopping_leg.robot.robot_files import robot_from_tree
+from hopping_leg.trace import Trace
+from tests.doc_pages import blocks
+from tests.identify.runs import SIDECAR, rig_log, swinging
 
 COUNT = int(os.environ.get("HOPPING_LEG_FUZZ", "200"))
 """Files of each kind."""
@@ -36,9 +52,9 @@ SECONDS = 60
 LONGEST = 1500
 """Characters of a sentence."""
 
-_NUMBER = re.compile(rb"-?\d+(\.\d+)?([eE][-+]?\d+)?")
-_WORD = re.compile(rb'"[^"]*"|[A-Za-z_]\w*')
-_STRANGE = (
+NUMBER = re.compile(rb"-?\d+(\.\d+)?([eE][-+]?\d+)?")
+WORD = re.compile(rb'"[^"]*"|[A-Za-z_]\w*')
+STRANGE = (
     b"0", b"-1", b"1e308", b"1e999", b"nan", b"NaN", b"inf", b"-inf", b"null", b"true", b'""', b"x",
     b"[]", b"{}", b"[1, 2]", b'{"a": 1}', b"9" * 400, b"9" * 5000, b"[" * 3000, b'"\xc3\xa4\xff"',
     b"'''", b"1979-05-27", b"\x00", b'"[red]:smile:"', b"2e9", b"1e-320",
@@ -66,105 +82,26 @@ def mutate(content: bytes, rng: np.random.Generator, *, text: bool) -> bytes:
                 extreme = struct.pack("<q", int(rng.choice([0, -1, 2**31 - 1, 2**62, 1 << 20])))
                 data[at : at + 8] = extreme[: int(rng.choice([1, 4, 8]))]
             case _:
-                found = list((_NUMBER if rng.integers(2) else _WORD).finditer(data))
+                found = list((NUMBER if rng.integers(2) else WORD).finditer(data))
                 if found:
                     start, end = found[int(rng.integers(len(found)))].span()
-                    data[start:end] = _STRANGE[int(rng.integers(len(_STRANGE)))]
+                    data[start:end] = STRANGE[int(rng.integers(len(STRANGE)))]
     return bytes(data)
 
 
-class Kind:
-    """Files in a folder of which one is mutated, and what reads them.
-
-    ``seal`` makes the file from the mutated content, e.g. with a checksum that fits.
-    """
-
-    def __init__(self, files, name, read, *, text=True, content=None, seal=lambda data: data):
-        self.files, self.name, self.read, self.text, self.seal = files, name, read, text, seal
-        self.content = files[name] if content is None else content
-
-    def write(self, folder, content):
-        """Write all files, one of them from this content."""
-        for name, whole in {**self.files, self.name: self.seal(content)}.items():
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            (folder / name).write_bytes(whole)
-
-    def try_seed(self, folder, seed):
-        """Read the file of a seed, which ends well or in sentences."""
-        rng = np.random.default_rng(seed)
-        self.write(folder, mutate(self.content, rng, text=self.text))
-        signal.alarm(SECONDS)
-        try:
-            sentences = getattr(self.read(folder / self.name), "warnings", ())
-        except HoppingLegError as error:
-            sentences = [str(error)]
-        finally:
-            signal.alarm(0)
-        for said in sentences:
-            assert said.endswith((".", "?")), said
-            assert "\n" not in said
-            assert len(said) <= LONGEST
-
-
-def _framed(header, data):
-    """Return a flight recording whose frames are cut from a content, checksums valid."""
-    from hopping_leg.flight_recording import MAGIC, frame
-
-    parts = data.split(b"\n\n")
-    kinds = [int(part[:1] or b"0", 36) % 4 if part[:1].isalnum() else 0 for part in parts]
-    return MAGIC + b"".join(frame(k, p[1:]) for k, p in zip(kinds, parts, strict=True))
-
-
-def _with_card(content, card):
-    """Return a policy with other metadata."""
-    import onnx
-
-    model = onnx.load_from_string(content)
-    model.metadata_props[0].value = card.decode("latin-1").replace("\0", " ")
-    return model.SerializeToString()
-
-
-def _native(header, table=None):
-    text = header.decode("latin-1").replace("\0", " ")
-    file = io.BytesIO()
-    (_table() if table is None else table).write_parquet(file, metadata={"hopping_leg": text})
-    return file.getvalue()
-
-
-def _table():
-    from tests.identify.runs import swinging
-
-    return swinging(80)
-
-
-def _written(write):
+def written(write):
+    """Return the files that a function writes into a folder."""
     with tempfile.TemporaryDirectory() as folder:
         write(Path(folder))
-        return {
-            str(file.relative_to(folder)): file.read_bytes()
-            for file in sorted(Path(folder).rglob("*"))
-            if file.is_file()
-        }
+        found = sorted(file for file in Path(folder).rglob("*") if file.is_file())
+        return {str(file.relative_to(folder)): file.read_bytes() for file in found}
 
 
-def _robots():
-    from importlib import resources
-
-    from hopping_leg.robot import build_model, load_robot
-
-    def read(path):
-        build_model(load_robot(path))
-
-    twin = resources.files("hopping_leg.robot") / "robots" / "twin.toml"
-    return Kind({"leg.toml": twin.read_bytes()}, "leg.toml", read)
+def readable(header):
+    return header.decode("latin-1").replace("\0", " ")
 
 
-def _descriptions(form):
-    from hopping_leg.robot import build_model, get_spec, load_robot, to_urdf
-    from hopping_leg.robot.importing import imported_robot
-    from hopping_leg.robot.planar_leg import read_leg
-    from hopping_leg.robot.robot_files import robot_from_tree
-
+def description(form):
     def read(path):
         made = imported_robot(read_leg(path), path.name, ("qdd100",))
         build_model(robot_from_tree(made.tree, path.name))
@@ -173,135 +110,129 @@ def _descriptions(form):
     spec = get_spec(leg)
     spec.compile()
     text = to_urdf(leg) if form == "urdf" else spec.to_xml()
-    return Kind({"leg.xml": text.encode()}, "leg.xml", read)
+    return read, {"leg.xml": text.encode()}
 
 
-def _gains():
-    from importlib import resources
-
-    from hopping_leg.controllers.energy_shaping.gains import load_gains
-
-    gains = resources.files("hopping_leg.controllers") / "gains" / "energy-shaping.toml"
-    return Kind({"gains.toml": gains.read_bytes()}, "gains.toml", load_gains)
-
-
-def _faults():
-    from hopping_leg.emulator.faults import load_faults
-
-    script = b'[[fault]]\nkind = "late_reply"\nsince = "flight"\nat = 2.0\n'
-    script += b'drive = "knee"\nvalue = 0.012\ncount = 3\n\n[[fault]]\nkind = "configuration"\n'
-    script += b'name = "servo.max_current_A"\nvalue = 20.0\nduration = 0.1\n'
-    return Kind({"faults.toml": script}, "faults.toml", load_faults)
+PACKAGE = resources.files("hopping_leg")
+TWIN = (PACKAGE / "robot/robots/twin.toml").read_bytes()
+GAINS = (PACKAGE / "controllers/gains/energy-shaping.toml").read_bytes()
+(FAULTS,) = (block.text.encode() for block in blocks("emulator") if "[[fault]]" in block.text)
+FAULTS += b'[[fault]]\nkind = "configuration"\nname = "servo.max_current_A"\nvalue = 20.0\n'
+SIDE, TABLE = SIDECAR.encode(), swinging(80)
+CSV, RIG = TABLE.write_csv().encode(), rig_log(rows=80).write_csv().encode()
+PACKED = gzip.compress(CSV)
 
 
-def _recordings(form):
-    from hopping_leg.identify.recording import load_recording
-    from tests.identify.runs import SIDECAR, rig_log
-
-    if form == "rig":
-        return Kind({"log.csv": rig_log(rows=80).write_csv().encode()}, "log.csv", load_recording)
-    files = {"run.toml": SIDECAR.encode(), "run.csv": _table().write_csv().encode()}
-    if form == "gzip":
-        files["run.csv.gz"] = gzip.compress(files.pop("run.csv"))
-        return Kind(files, "run.csv.gz", load_recording, text=False)
-    if form == "sidecar":
-        return Kind(files, "run.toml", lambda path: load_recording(path.with_name("run.csv")))
-    return Kind(files, "run.csv", load_recording)
+def sidecar():
+    files = {"run.toml": SIDE, "run.csv": CSV}
+    return lambda path: load_recording(path.with_name("run.csv")), files
 
 
-def _bags(form):
+def mcap():
     from hopping_leg.formats import to_mcap
-    from hopping_leg.identify.recording import load_recording
-    from hopping_leg.trace import Trace
-    from tests.identify.runs import SIDECAR
+
+    return load_recording, {"run.mcap": to_mcap(Trace(TABLE)), "run.toml": SIDE}
+
+
+def sqlite():
     from tests.test_formats import record
 
-    if form == "mcap":
-        files = {"run.toml": SIDECAR.encode(), "run.mcap": to_mcap(Trace(_table()))}
-        return Kind(files, "run.mcap", load_recording, text=False)
-    files = _written(lambda folder: record(folder / "run", "sqlite3", _table()))
-    (name,) = (name for name in files if name.endswith(".db3"))
-    return Kind({"run/run.toml": SIDECAR.encode(), **files}, name, load_recording, text=False)
+    files = written(lambda folder: record(folder / "run", "sqlite3", TABLE))
+    files = dict(sorted(files.items(), key=lambda file: not file[0].endswith(".db3")))
+    return load_recording, {**files, "run/run.toml": SIDE}
 
 
-def _traces(form):
-    from hopping_leg.identify.excitation import Multisine, load_excitation, make_excitation
-    from hopping_leg.identify.recording import load_recording
-    from hopping_leg.robot import load_robot
+def header(table, content, read):
+    """Return a Parquet file whose header is mutated."""
 
-    if form == "excitation":
-        excitation = make_excitation(Multisine(duration=12.0), load_robot("legv2"))
-        files = _written(lambda folder: excitation.save(folder / "run.parquet"))
-        whole = io.BytesIO(files["run.parquet"])
-        header = pl.read_parquet_metadata(whole)["hopping_leg"].encode()
-        seal = functools.partial(_native, table=pl.read_parquet(whole))
-        return Kind(files, "run.parquet", load_excitation, content=header, seal=seal)
-    recording = {"rig": "fixed-base", "rate_hz": 200.0, "robot": "legv2", "source": "made up"}
-    header = json.dumps({"schema": 1, "events": [], "recording": recording}).encode()
-    files = {"run.parquet": _native(header)}
-    return Kind(files, "run.parquet", load_recording, content=header, seal=_native)
+    def seal(content):
+        file = io.BytesIO()
+        table.write_parquet(file, metadata={"hopping_leg": readable(content)})
+        return file.getvalue()
+
+    return read, {"run.parquet": content}, seal
 
 
-def _boxes(form):
-    from hopping_leg.deploy.flight_recorder import FlightRecorder
-    from hopping_leg.flight_recording import recover
+def recording():
+    about = {"rig": "fixed-base", "rate_hz": 200.0, "robot": "legv2", "source": "made up"}
+    tree = {"schema": 1, "events": [], "recording": about}
+    return header(TABLE, json.dumps(tree).encode(), load_recording)
 
-    columns = ("time_s", "command_m", "hip_position_rad")
-    first = json.dumps({"columns": columns, "header": {"robot": "legv2"}}).encode()
-    row, event = struct.pack("<3d", 1, 2, 3), json.dumps({"state": "damping"}).encode()
-    framed = b"\n\n".join([b"0" + first, b"1" + row, b"2" + event, b"1" + row])
 
+def excitation():
+    made = make_excitation(Multisine(duration=12.0), load_robot("legv2"))
+    ((_, content),) = written(lambda folder: made.save(folder / "run.parquet")).items()
+    told = pl.read_parquet_metadata(io.BytesIO(content))["hopping_leg"].encode()
+    return header(pl.read_parquet(io.BytesIO(content)), told, load_excitation)
+
+
+def flight():
     def write(folder):
-        box = FlightRecorder(folder / "run.blackbox", columns, {"robot": "legv2"})
+        box = FlightRecorder(folder / "run.blackbox", ("time_s", "command_m"), {"robot": "legv2"})
         for tick in range(9):
-            box.row([float(tick), 0.3, 1.0])
+            box.row([float(tick), 0.3])
         box.event(state="damping")
         box.close()
 
-    files = _written(write)
-    if form == "raw":
-        return Kind(files, "run.blackbox", recover, text=False)
-    seal = functools.partial(_framed, first)
-    return Kind(files, "run.blackbox", recover, content=framed, seal=seal)
+    return recover, written(write)
 
 
-def _checkpoints():
+def frames():
+    """Return a flight recording whose frames are cut from a content, with checksums that fit."""
+
+    def seal(data):
+        parts = data.split(b"\n\n")
+        kinds = [int(part[:1]) % 4 if part[:1].isdigit() else 0 for part in parts]
+        return MAGIC + b"".join(frame(k, p[1:]) for k, p in zip(kinds, parts, strict=True))
+
+    first = b'0{"columns": ["time_s", "command_m"], "header": {"robot": "legv2"}}'
+    row = b"1" + struct.pack("<2d", 1, 2)
+    content = b"\n\n".join([first, row, b'2{"state": "damping"}', row])
+    return recover, {"run.blackbox": content}, seal
+
+
+def checkpoint():
     from hopping_leg.rl.checkpoint import read_checkpoint, write_checkpoint
 
     tree = {"weights": np.arange(60.0).reshape(3, 20), "steps": 7, "names": ["a", {"b": np.eye(2)}]}
-    files = _written(lambda folder: write_checkpoint(folder, 7, tree))
-    return Kind(files, *files, read_checkpoint, text=False)
+    return read_checkpoint, written(lambda folder: write_checkpoint(folder, 7, tree))
 
 
-def _policies(form):
-    from hopping_leg.controllers.policy import Policy
-    from hopping_leg.controllers.registry import load_policy
-
+def card():
     policy = load_policy("fast")
-    files = {"policy.onnx": policy.content}
-    if form == "card":
-        card = policy.card.to_json().encode()
-        seal = functools.partial(_with_card, policy.content)
-        return Kind(files, "policy.onnx", Policy.load, content=card, seal=seal)
-    return Kind(files, "policy.onnx", Policy.load, text=False)
+
+    def seal(content):
+        model = onnx.load_from_string(policy.content)
+        model.metadata_props[0].value = readable(content)
+        return model.SerializeToString()
+
+    return Policy.load, {"policy.onnx": policy.card.to_json().encode()}, seal
 
 
 KINDS = {
-    "robot": _robots,
-    **{f"description-{f}": functools.partial(_descriptions, f) for f in ("urdf", "mjcf")},
-    "gains": _gains,
-    "faults": _faults,
-    **{
-        f"recording-{form}": functools.partial(_recordings, form)
-        for form in ("csv", "rig", "gzip", "sidecar")
-    },
-    **{f"bag-{form}": functools.partial(_bags, form) for form in ("mcap", "sqlite")},
-    **{f"trace-{f}": functools.partial(_traces, f) for f in ("header", "excitation")},
-    **{f"flight-recorder-{f}": functools.partial(_boxes, f) for f in ("raw", "framed")},
-    "checkpoint": _checkpoints,
-    **{f"policy-{f}": functools.partial(_policies, f) for f in ("raw", "card")},
+    "robot": lambda: (lambda path: build_model(load_robot(path)), {"leg.toml": TWIN}),
+    "description-urdf": lambda: description("urdf"),
+    "description-mjcf": lambda: description("mjcf"),
+    "gains": lambda: (load_gains, {"gains.toml": GAINS}),
+    "faults": lambda: (load_faults, {"faults.toml": FAULTS}),
+    "recording-csv": lambda: (load_recording, {"run.csv": CSV, "run.toml": SIDE}),
+    "recording-rig": lambda: (load_recording, {"log.csv": rig_log(rows=80).write_csv().encode()}),
+    "recording-gzip": lambda: (load_recording, {"run.csv.gz": PACKED, "run.toml": SIDE}),
+    "recording-sidecar": sidecar,
+    "bag-mcap": mcap,
+    "bag-sqlite": sqlite,
+    "trace-header": recording,
+    "trace-excitation": excitation,
+    "flight-recorder-raw": flight,
+    "flight-recorder-framed": frames,
+    "checkpoint": checkpoint,
+    "policy-raw": lambda: (Policy.load, {"policy.onnx": load_policy("fast").content}),
+    "policy-card": card,
 }
-"""What makes each kind."""
+"""What makes each kind: what reads it, and its files, of which the first is mutated.
+
+Where a third part follows, it makes that file from the mutated content, e.g. with a checksum that
+fits."""
 
 
 @pytest.mark.slow
@@ -313,20 +244,35 @@ def test_no_mutated_file_ends_in_anything_but_a_sentence(kind):
 
 
 def main(name, count):
-    """Try seeds; the last one that is printed ended in something else."""
-    kind = KINDS[name]()
+    """Try seeds; the last one that is printed ended in something else, or took too long."""
+    read, files, *seal = KINDS[name]()
+    changed, whole = next(iter(files.items()))
+    text = bool(seal) or changed.endswith((".toml", ".csv", ".xml"))
 
-    def too_long(*_):
-        raise RuntimeError(f"it took more than {SECONDS} s")
+    def told(content):
+        """Return what is said of a content, which ends well or in sentences."""
+        with tempfile.TemporaryDirectory() as folder:
+            for file, data in {**files, changed: seal[0](content) if seal else content}.items():
+                path = Path(folder) / file
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(data)
+            return getattr(read(Path(folder) / changed), "warnings", ())
 
-    signal.signal(signal.SIGALRM, too_long)
-    with tempfile.TemporaryDirectory() as folder:
-        kind.write(Path(folder) / "files", kind.content)
-        kind.read(Path(folder) / "files" / kind.name)  # what is not mutated is read
-        for seed in range(count):
-            print(seed, flush=True)
-            kind.try_seed(Path(folder) / "files", (zlib.crc32(name.encode()), seed))
-            assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 < MEMORY
+    told(whole)  # what is not mutated is read
+    for seed in range(count):
+        print(seed, flush=True)
+        rng = np.random.default_rng((zlib.crc32(name.encode()), seed))
+        signal.alarm(SECONDS)
+        try:
+            sentences = told(mutate(whole, rng, text=text))
+        except HoppingLegError as error:
+            sentences = [str(error)]
+        signal.alarm(0)
+        for said in sentences:
+            assert said.endswith((".", "?")), said
+            assert "\n" not in said
+            assert len(said) <= LONGEST
+        assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 < MEMORY
 
 
 if __name__ == "__main__":

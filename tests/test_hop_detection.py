@@ -18,20 +18,16 @@ STAND = 0.2
 
 def hopping(apexes, stance=0.2, sink=0.03):
     """Ballistic flights to the given apexes, joined by half-sine stances."""
-    height, rate, gap = [], [], []
+    dip, ticks = np.pi / stance, np.arange(round(stance * RATE)) / RATE
+    low = sink * np.sin(dip * ticks)
+    stood = np.stack([STAND - low, -sink * dip * np.cos(dip * ticks), -0.2 * low])
+    parts = []
     for apex in apexes:
-        ticks = np.arange(round(stance * RATE)) / RATE
-        dip = np.pi / stance
-        height.append(STAND - sink * np.sin(dip * ticks))
-        rate.append(-sink * dip * np.cos(dip * ticks))
-        gap.append(np.minimum(0.0, -0.2 * sink * np.sin(dip * ticks)))
         speed = np.sqrt(2 * GRAVITY * (apex - STAND))
         t = np.arange(int(2 * speed / GRAVITY * RATE)) / RATE
-        flight = STAND + speed * t - GRAVITY / 2 * t**2
-        height.append(flight)
-        rate.append(speed - GRAVITY * t)
-        gap.append(flight - STAND)
-    return tuple(np.concatenate(part) for part in (height, rate, gap))
+        above = speed * t - GRAVITY / 2 * t**2
+        parts += [stood, np.stack([STAND + above, speed - GRAVITY * t, above])]
+    return tuple(np.concatenate(parts, axis=1))
 
 
 def test_every_apex_is_found_within_a_tenth_of_a_millimetre():

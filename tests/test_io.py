@@ -10,33 +10,20 @@ from typing import Literal
 import numpy as np
 import polars as pl
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from hopping_leg import io
 from hopping_leg.errors import RobotError, TraceError, UsageError
 from hopping_leg.io import write_atomically
 from hopping_leg.trace import COLUMNS, Trace
 
-VALUES = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False)
-    | st.text(),
-    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
-)  # fmt: skip
-
 
 def test_json_has_null_where_there_is_no_number_and_a_folder_is_no_file(tmp_path):
     file = tmp_path / "deep" / "x.json"
-    io.write_json(file, {"a": [math.nan, 1.5, (math.inf,)], "b": None})
-    assert json.loads(file.read_text()) == {"a": [None, 1.5, [None]], "b": None}
+    io.write_json(file, {"a": [math.nan, 1.5, (math.inf,)], "b": None, "\u03c4": [True, 7, "x"]})
+    kept = {"a": [None, 1.5, [None]], "b": None, "\u03c4": [True, 7, "x"]}
+    assert json.loads(file.read_text()) == kept
     with pytest.raises(TraceError):
         io.write_json(tmp_path, {})
-
-
-@given(VALUES)
-def test_what_json_knows_comes_back(value):
-    assert io.plain(value) == value
-    assert json.loads(io.json_text(value)) == value
 
 
 @dataclass(frozen=True)
@@ -53,20 +40,16 @@ class Inner:
 class Outer:
     name: str
     inner: Inner
-    count: int = 1
-    on: bool = False
     pair: tuple[float, float] | None = None
-    kind: Literal["a", "b"] = "a"
 
 
 WHOLE = {"name": "x", "inner": {}}
 
 
 def test_a_dataclass_comes_back_from_its_table():
-    outer = Outer("x", Inner("high", 2.5), 3, True, (1.0, 2.0), "b")
+    outer = Outer("x", Inner("high", 2.5), (1.0, 2.0))
     tree = json.loads(io.json_text(dataclasses.asdict(outer)))
     assert io.read_dataclass(Outer, tree, "f") == outer
-    assert io.read_dataclass(Outer, {**WHOLE, "pair": [1, 2]}, "f").pair == (1.0, 2.0)
 
 
 @pytest.mark.parametrize(
@@ -78,9 +61,6 @@ def test_a_dataclass_comes_back_from_its_table():
         ({"inner": {"level": "mid"}}, "f: 'inner.level': There is no value 'mid'."),
         ({"inner": {"gain": -1}}, "f: 'gain' is -1.0 but must be zero or more."),
         ({"inner": {"gain": math.inf}}, "f: 'inner.gain' is inf but must be a finite number."),
-        ({"count": 1.5}, "f: 'count': Expected `int`, got `float`."),
-        ({"pair": [1.0]}, "f: 'pair': Expected `array` of length 2, got 1."),
-        ({"kind": "c"}, "f: 'kind': There is no value 'c'. Available: a, b."),
     ],
 )
 def test_mistakes_in_a_table_are_one_sentence_with_the_field(change, sentence):
@@ -117,14 +97,10 @@ def test_a_trace_survives_its_file_and_saved_again_has_the_same_bytes(tmp_path):
     back = Trace.load(path)
     assert back.header == trace.header
     assert back.table.equals(trace.table)
-    assert back.column("height_m").dtype == np.float64
+    with pytest.raises(TraceError, match=r"no column 'speed'.*height_m"):
+        back.column("speed")
     some_trace().save(tmp_path / "again.parquet")
     assert (tmp_path / "again.parquet").read_bytes() == path.read_bytes()
-
-
-def test_a_missing_column_is_named_with_those_that_exist():
-    with pytest.raises(TraceError, match=r"no column 'speed'.*height_m"):
-        some_trace().column("speed")
 
 
 def test_missing_foreign_and_cut_files_are_refused_in_a_sentence(tmp_path):

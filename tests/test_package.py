@@ -28,11 +28,8 @@ def test_the_source_archive_holds_what_is_installed_and_read_nothing_large_and_n
     with tarfile.open(file) as content:
         archive = {m.name.partition("/")[2]: m.size for m in content.getmembers() if m.isfile()}
     package = Path(hopping_leg.__file__).parent
-    inside = {
-        f"src/hopping_leg/{path.relative_to(package)}"
-        for path in package.rglob("*")
-        if path.is_file() and "__pycache__" not in path.parts
-    }
+    files = [path.relative_to(package) for path in package.rglob("*") if path.is_file()]
+    inside = {f"src/hopping_leg/{path}" for path in files if "__pycache__" not in path.parts}
     assert {Path(name).suffix for name in inside} >= {".py", ".toml", ".xml", ".onnx", ".j2"}
     assert "src/hopping_leg/py.typed" in inside
     read = {"README.md", "CITATION.cff", "CHANGELOG.md", "constraints.txt", "Makefile"}
@@ -41,8 +38,8 @@ def test_the_source_archive_holds_what_is_installed_and_read_nothing_large_and_n
     examples = {f"examples/{path.name}" for path in (ROOT / "examples").glob("*.*")}
     assert not (inside | read | examples) - set(archive)
     assert not {name: size for name, size in archive.items() if size > LARGEST}
-    top = {name.partition("/")[0] for name in archive}
-    assert not top & {"runs", "build", "site", ".venv", "MUJOCO_LOG.TXT"}
+    left = {"runs", "build", "site", ".venv", "MUJOCO_LOG.TXT"}
+    assert not left & {name.partition("/")[0] for name in archive}
 
 
 def test_the_container_is_built_by_the_commands_of_the_readme():
@@ -57,12 +54,9 @@ def test_the_container_is_built_by_the_commands_of_the_readme():
     assert not read_options(View, "hop demo", None, call[1:]).browser
 
 
-def test_the_installed_version_is_the_projects_and_is_in_the_changelog():
+def test_the_installed_version_is_that_of_project_changelog_and_citation():
     assert importlib.metadata.version("hopping-leg") == PROJECT["version"]
     assert f"## {PROJECT['version']}" in (ROOT / "CHANGELOG.md").read_text()
-
-
-def test_the_citation_is_of_this_version():
     yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     assert citation["version"] == PROJECT["version"]
