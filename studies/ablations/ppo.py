@@ -70,7 +70,7 @@ class _TrueState(TaskVecEnv):
     """Shows the true state and the last action."""
 
     def __init__(self, task: envs.HoppingTask) -> None:
-        super().__init__(task, privileged=True)
+        super().__init__(task)
         size = task.privileged_size + 2
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
 
@@ -174,7 +174,7 @@ def refine(dagger: Dagger, recipe: Recipe, robot: Robot, seed: int, steps: int) 
     network = recipe.network
     assert isinstance(student, WindowStudent), "only dense students are refined"
     assert isinstance(network, StudentConfig), "a distillation has a student"
-    env = TaskVecEnv(_task(recipe, robot, seed), privileged=True)
+    env = TaskVecEnv(_task(recipe, robot, seed))
     parts = {"actor": env.task.observation.size, "hidden": list(network.hidden)}
     model = _ppo(env, 1e-4, _LOG_STD[1], seed, _Policy, **parts)
     layers = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]

@@ -79,9 +79,8 @@ def test_everything_random_follows_the_seed(kind):
     env.close()
 
 
-@pytest.mark.parametrize("kind", [VECTOR, SYNC])
-def test_a_leg_knows_nothing_of_its_neighbour(kind):
-    env = make(kind)
+def test_a_leg_knows_nothing_of_its_neighbour():
+    env = make(VECTOR)
     actions = plan(env)
     rows = []
     for factor in (1, -1):

@@ -5,73 +5,77 @@ import math
 
 import pytest
 
-from hopping_leg.controllers.mpc import HopShape, Planning
 from hopping_leg.errors import UsageError
 from hopping_leg.rl import reach
 from hopping_leg.rl.policy_evaluation import CommandResult
-from hopping_leg.rl.reach import Reach, reach_of_legs, task_leg, within_reach
+from hopping_leg.rl.reach import find_legs, within_reach
 from hopping_leg.rl.recipes import RECIPES
 from hopping_leg.rl.train import stages_of
-from hopping_leg.sim.any_leg import draw_any_leg
 from hopping_leg.workers import ProcessWorkers
 from tests.rl.learners import ROBOT
 
 FAST = RECIPES["fast"].replace(heights=(0.26, 0.40)).fit(ROBOT)
-HEIGHTS = (0.21, 0.42)
-TEACHER = (HopShape(), Planning(timestep=1.25e-3, elastic_timestep=5e-4, every=2))
+ANY = RECIPES["universal"]
+HEIGHTS = ANY.task.command_range
+TEACHER = ANY.algorithm.teacher, ANY.algorithm.planning
 
 
 class Here:
-    """Workers that count what they are asked for."""
-
-    count = 1
+    """Workers that keep what they are asked for."""
 
     def __init__(self):
         self.asked = []
 
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
     def map(self, function, arguments):
-        self.asked += [values[0] for values in arguments]
+        self.asked += [str(values[0]) for values in arguments]
         return [function(*values) for values in arguments]
 
 
 @pytest.fixture(autouse=True)
-def _few(monkeypatch):
+def here(monkeypatch):
+    workers = Here()
     monkeypatch.setattr(reach, "_AT_ONCE", 2)
     monkeypatch.setattr(reach, "_ROUND", 4)
+    monkeypatch.setattr(reach, "ProcessWorkers", lambda _: workers)
+    return workers
 
 
-def find(folder, count, workers, seed=0, heights=HEIGHTS):
+def find(folder, count, seed=0):
     told = []
-    found = reach_of_legs(count, seed, heights, TEACHER, workers, folder / "legs.json", told.append)
-    assert not told or told[-1] == count
+    found = find_legs(ANY.replace(num_envs=count), seed, folder / "legs.json", 1, None, told.append)
+    assert not told or told[-1] == 1
     return found
 
 
 def test_legs_are_asked_for_heights_of_their_own_size(tmp_path):
-    found = find(tmp_path, 5, Here())
-    assert len({one.leg for one in found}) == 5
-    for one in found:
-        scale = draw_any_leg(one.leg).true.straight_height / 0.30
-        assert HEIGHTS[0] <= one.low / scale + 1e-9
-        assert one.low < one.high <= scale * HEIGHTS[1] + 1e-9
-        leg = task_leg(one)
-        assert leg.command_range == (one.low, one.high)
-        assert leg.true == draw_any_leg(one.leg).true
+    found = find(tmp_path, 5)
+    assert len({leg.true.digest for leg in found}) == 5
+    for leg in found:
+        low, high = leg.command_range
+        assert leg.true.size * HEIGHTS[0] <= low + 1e-9
+        assert low < high <= leg.true.size * HEIGHTS[1] + 1e-9
 
 
-def test_what_was_found_is_not_looked_for_again_and_no_worker_changes_it(tmp_path):
-    first = Here()
-    found = find(tmp_path, 5, first)
-    again = Here()
-    assert find(tmp_path, 3, again) == found[:3]
-    assert again.asked == []
-    more = find(tmp_path, 8, again)
+def test_what_was_found_is_not_looked_for_again_and_no_worker_changes_it(
+    tmp_path, here, monkeypatch
+):
+    found = find(tmp_path, 5)
+    first = here.asked[:]
+    assert find(tmp_path, 3) == found[:3]
+    assert here.asked == first
+    more = find(tmp_path, 8)
     assert more[:5] == found
-    assert not set(map(str, again.asked)) & set(map(str, first.asked))
-    with ProcessWorkers(1) as processes:
-        assert find(tmp_path / "others", 8, processes) == more
-    other = Here()
-    assert not {r.leg for r in find(tmp_path, 2, other, seed=1)} & {r.leg for r in found}
+    assert len(set(here.asked)) == len(here.asked)
+    digests = {leg.true.digest for leg in found}
+    assert not {leg.true.digest for leg in find(tmp_path / "seed", 2, seed=1)} & digests
+    monkeypatch.setattr(reach, "ProcessWorkers", ProcessWorkers)
+    assert find(tmp_path / "others", 8) == more
 
 
 def test_a_leg_that_hardly_hops_is_left_out(monkeypatch):
@@ -80,12 +84,12 @@ def test_a_leg_that_hardly_hops_is_left_out(monkeypatch):
 
 
 def test_a_damaged_file_is_one_sentence(tmp_path):
-    find(tmp_path, 1, Here())
+    found = find(tmp_path, 1)
     for content in (b"{", b'{"asked": 1', b"[]"):
         (tmp_path / "legs.json").write_bytes(content)
         with pytest.raises(UsageError):
-            find(tmp_path, 1, Here())
-    assert isinstance(find(tmp_path / "new", 1, Here())[0], Reach)
+            find(tmp_path, 1)
+    assert find(tmp_path / "new", 1) == found
 
 
 def with_motors(**factors):

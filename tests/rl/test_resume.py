@@ -64,14 +64,6 @@ def test_only_whole_checkpoints_count_two_are_kept_and_no_code_in_them_runs(tmp_
             read_checkpoint(path)
 
 
-def test_a_folder_with_checkpoints_of_an_older_version_alone_is_refused(tmp_path):
-    (tmp_path / "checkpoint-000000000001").mkdir()
-    with pytest.raises(UsageError, match="older version"):
-        list_checkpoints(tmp_path)
-    newest = write_checkpoint(tmp_path, 2, {})
-    assert list_checkpoints(tmp_path) == [newest]
-
-
 def test_a_run_is_never_overwritten_or_mixed(tmp_path, monkeypatch):
     try_briefly(monkeypatch)
     out = tmp_path / "run"

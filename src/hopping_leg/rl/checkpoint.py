@@ -37,11 +37,8 @@ def write_checkpoint(folder: Path, steps: int, tree: Tree) -> Path:
 
 
 def list_checkpoints(folder: Path) -> list[Path]:
-    """Return the whole checkpoints of a run, oldest first; ``UsageError`` if all are too old."""
-    found = sorted(folder.glob("checkpoint-*.pt"))
-    if not found and any(path.is_dir() for path in folder.glob("checkpoint-*")):
-        raise UsageError(f"{folder} has only checkpoints of an older version; train anew.")
-    return found
+    """Return the whole checkpoints of a run, oldest first."""
+    return sorted(folder.glob("checkpoint-*.pt"))
 
 
 def read_checkpoint(path: Path) -> Tree:

@@ -22,14 +22,6 @@ from hopping_leg.controllers.policy import MEMORY, METADATA_KEY, NEXT_MEMORY, Ca
 from hopping_leg.envs.observation import Observation
 
 _OPSET = 17
-_KNOWN = (
-    "You are using the legacy TorchScript-based ONNX export",
-    "The feature will be removed",
-    "Exporting a model to ONNX with a batch_size other than 1",
-    "Converting a tensor to a Python boolean",
-)
-"""How warnings begin: this way to export is old, and asks for what is given, the memory as an
-input."""
 _SPACING = 0.01
 """Of the heights of a command map, m."""
 
@@ -132,8 +124,7 @@ def build_policy(actor: Actor, observation: Observation, card: Card) -> bytes:
     example = tuple(torch.zeros(1, *shape) for shape in graph.inputs.values())
     file = io.BytesIO()
     with warnings.catch_warnings():
-        for known in _KNOWN:
-            warnings.filterwarnings("ignore", known)
+        warnings.simplefilter("ignore")  # this way to export is old, and asks for what is given
         torch.onnx.export(
             graph,
             example,

@@ -24,7 +24,7 @@ from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot import Robot
 from hopping_leg.sim import NO_NOISE, compile_physics
 from hopping_leg.sim.any_leg import draw_any_leg
-from hopping_leg.workers import ProcessWorkers, RayWorkers, Workers
+from hopping_leg.workers import ProcessWorkers, RayWorkers
 
 _REACHED = 0.005
 """Median error with which the teacher reaches a height on the robot, m."""
@@ -116,43 +116,6 @@ def _find_some(
     return [reach for reach in found if reach is not None]
 
 
-def reach_of_legs(
-    count: int,
-    seed: int,
-    heights: tuple[float, float],
-    teacher: tuple[HopShape, Planning],
-    workers: Workers,
-    file: Path,
-    on_progress: Callable[[int], None],
-) -> list[Reach]:
-    """Return the reach of so many legs; the same for the same seed, whoever does the work.
-
-    What ``file`` holds already is not done again; ``on_progress`` is told how many are known.
-
-    Raises:
-        UsageError: The file is damaged.
-    """
-    asked = io.plain(
-        {"seed": seed, "heights": heights, "teacher": [asdict(part) for part in teacher]}
-    )
-    tried, found = 0, list[Reach]()
-    if file.exists():
-        stored = io.parse_json(file.read_bytes(), str(file))
-        if stored.get("asked") == asked:
-            found = [io.read_dataclass(Reach, row, str(file)) for row in stored["legs"]]
-            tried = stored["tried"]
-    while len(found) < count:
-        first = seed * _BETWEEN_SEEDS + tried
-        parts = [range(first + k, first + k + _AT_ONCE) for k in range(0, _ROUND, _AT_ONCE)]
-        for reaches in workers.map(_find_some, [(legs, heights, *teacher) for legs in parts]):
-            found += reaches
-        tried += _ROUND
-        rows = [asdict(reach) for reach in found]
-        io.write_json(file, {"asked": asked, "tried": tried, "legs": rows})
-        on_progress(min(len(found), count))
-    return found[:count]
-
-
 def find_legs(
     recipe: Recipe,
     seed: int,
@@ -161,12 +124,12 @@ def find_legs(
     ray: str | None,
     on_progress: Callable[[float], None],
 ) -> list[TaskLeg]:
-    """Return the legs of a training for any leg, none for others.
+    """Return the legs of a training for any leg, none for others; the seed decides on them.
 
     Args:
         recipe: Of the training.
         seed: Of the training.
-        file: Keeps what is found.
+        file: What it holds already is not looked for again.
         processes: Of this machine, which find out what the teacher reaches.
         ray: Address of a Ray cluster that does it instead.
         on_progress: Told the share that is done, 0 to 1.
@@ -177,16 +140,28 @@ def find_legs(
     if recipe.legs == "robot":
         return []
     assert isinstance(recipe.algorithm, DaggerConfig), "a teacher says what legs reach"
-    teacher = (recipe.algorithm.teacher, recipe.algorithm.planning)
-    count = recipe.schedule.num_envs
+    count, heights = recipe.schedule.num_envs, recipe.task.command_bounds
+    teacher = recipe.algorithm.teacher, recipe.algorithm.planning
+    asked = io.plain({"seed": seed, "heights": heights, "teacher": [asdict(t) for t in teacher]})
+    tried, found = 0, list[Reach]()
+    if file.exists():
+        stored = io.parse_json(file.read_bytes(), str(file))
+        if stored.get("asked") == asked:
+            found = [io.read_dataclass(Reach, row, str(file)) for row in stored["legs"]]
+            tried = stored["tried"]
     compile_physics()
     with ProcessWorkers(processes) as local:
         workers = local if ray is None else RayWorkers(ray)
-        found = reach_of_legs(
-            count, seed, recipe.task.command_bounds, teacher, workers, file,
-            lambda known: on_progress(known / count),
-        )  # fmt: skip
-    return [task_leg(reach) for reach in found]
+        while len(found) < count:
+            first = seed * _BETWEEN_SEEDS + tried
+            parts = [range(first + k, first + k + _AT_ONCE) for k in range(0, _ROUND, _AT_ONCE)]
+            for reaches in workers.map(_find_some, [(legs, heights, *teacher) for legs in parts]):
+                found += reaches
+            tried += _ROUND
+            rows = [asdict(reach) for reach in found]
+            io.write_json(file, {"asked": asked, "tried": tried, "legs": rows})
+            on_progress(min(len(found) / count, 1.0))
+    return [task_leg(reach) for reach in found[:count]]
 
 
 def task_leg(reach: Reach) -> TaskLeg:

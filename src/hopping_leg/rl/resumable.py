@@ -4,9 +4,7 @@ The state is taken at the entry of ``collect_rollouts``: after the gradient step
 exploration noise is drawn. Continuing from there is the same as never having stopped, bit by bit.
 """
 
-import random
 import time
-from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -86,6 +84,8 @@ class ResumableSAC(SAC):  # type: ignore[misc]
 
     def state(self) -> Tree:
         """Return everything needed to continue exactly, its environment included."""
+        buffer = self.replay_buffer
+        filled = buffer.buffer_size if buffer.full else buffer.pos
         tree = {
             "policy": self.policy.state_dict(),
             "optimizers": [o.state_dict() for o in _optimizers(self)],
@@ -93,9 +93,12 @@ class ResumableSAC(SAC):  # type: ignore[misc]
             "env": self.env.state(),
             "last_observation": self._last_obs,
             "last_episode_starts": self._last_episode_starts,
-            "episodes": list(self.ep_info_buffer),
             "random": _random_state(self),
-            "replay": _replay_state(self.replay_buffer),
+            "replay": {
+                "pos": buffer.pos,
+                "full": buffer.full,
+                "arrays": {name: getattr(buffer, name)[:filled] for name in _REPLAY},
+            },
         }
         if self.log_ent_coef is not None:
             tree["log_ent_coef"] = self.log_ent_coef.detach().numpy().copy()
@@ -113,8 +116,6 @@ class ResumableSAC(SAC):  # type: ignore[misc]
             setattr(self, name, value)
         self._last_obs = state["last_observation"]
         self._last_episode_starts = state["last_episode_starts"]
-        self.ep_info_buffer = deque(state["episodes"], maxlen=self._stats_window_size)
-        self.ep_success_buffer: deque[Any] = deque(maxlen=self._stats_window_size)
         buffer, replay = self.replay_buffer, state["replay"]
         for name, values in replay["arrays"].items():
             getattr(buffer, name)[: len(values)] = values
@@ -127,19 +128,11 @@ def _optimizers(model: SAC) -> list[torch.optim.Optimizer]:
     return own + ([model.ent_coef_optimizer] if model.ent_coef_optimizer is not None else [])
 
 
-def _replay_state(buffer: Any) -> Tree:  # noqa: ANN401
-    filled = buffer.buffer_size if buffer.full else buffer.pos
-    arrays = {name: getattr(buffer, name)[:filled] for name in _REPLAY}
-    return {"pos": buffer.pos, "full": buffer.full, "arrays": arrays}
-
-
 def _random_state(model: SAC) -> Tree:
     kind, keys, position, has_gauss, gauss = np.random.get_state(legacy=True)  # noqa: NPY002
-    version, words, gauss_next = random.getstate()
     return {
         "torch": torch.get_rng_state().numpy(),
         "numpy": [str(kind), np.asarray(keys), int(position), int(has_gauss), float(gauss)],
-        "python": [version, list(words), gauss_next],
         "actions": model.action_space.np_random.bit_generator.state,
     }
 
@@ -147,6 +140,4 @@ def _random_state(model: SAC) -> Tree:
 def _restore_random(model: SAC, state: Tree) -> None:
     torch.set_rng_state(torch.from_numpy(state["torch"]))
     np.random.set_state(tuple(state["numpy"]))  # noqa: NPY002
-    version, words, gauss_next = state["python"]
-    random.setstate((version, tuple(words), gauss_next))
     model.action_space.np_random.bit_generator.state = state["actions"]

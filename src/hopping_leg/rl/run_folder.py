@@ -53,8 +53,7 @@ class RunFolder:
         """Prepare the folder; return the newest checkpoint if there is one to resume from.
 
         Raises:
-            UsageError: The folder holds another or finished run, or checkpoints of an older
-                version alone.
+            UsageError: The folder holds another or finished run.
         """
         if new:
             write_json(self.path / "config.json", self.config)
@@ -75,12 +74,10 @@ class RunFolder:
         """Raise ``UsageError`` that names what else the run in the folder was asked for."""
         stored = _read_json(self.path / "config.json")
         for key in _ASKED:
-            there, asked = stored.get(key), self.config[key]
-            if there != asked:
+            if stored.get(key) != self.config[key]:
                 raise UsageError(
-                    f"The run in {self.path} has another {key.replace('_', ' ')}"
-                    f" ({_short(there)} instead of {_short(asked)});"
-                    " resume it with the options that it began with."
+                    f"The run in {self.path} has another {key.replace('_', ' ')}; resume it with"
+                    " the options that it began with."
                 )
 
 
@@ -117,10 +114,6 @@ def _read_json(file: Path) -> dict[str, Any]:
 
 def _name(function: object) -> str:
     return str(getattr(function, "__qualname__", type(function).__qualname__))
-
-
-def _short(value: Any) -> str:  # noqa: ANN401
-    return "other values" if isinstance(value, dict) else repr(value)
 
 
 def model_card(result: dict[str, Any]) -> str:

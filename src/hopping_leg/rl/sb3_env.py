@@ -14,14 +14,14 @@ from hopping_leg.envs.task import HoppingTask, Step
 class TaskVecEnv(VecEnv):  # type: ignore[misc]
     """A ``HoppingTask`` for stable-baselines3.
 
-    Observations are (n, size); with ``privileged`` the true state follows in the same rows, for
-    critics that may see it in training. All randomness is the task's; ``seed`` and ``set_options``
+    Observations are (n, size); the true state follows what is measured in the same rows, for
+    critics that see it in training. All randomness is the task's; ``seed`` and ``set_options``
     of stable-baselines3 change nothing.
     """
 
-    def __init__(self, task: HoppingTask, *, privileged: bool = False) -> None:
-        self.task, self._privileged = task, privileged
-        size = task.observation.size + (task.privileged_size if privileged else 0)
+    def __init__(self, task: HoppingTask) -> None:
+        self.task = task
+        size = task.observation.size + task.privileged_size
         space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
         self.render_mode = None
         super().__init__(task.count, space, gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32))
@@ -62,14 +62,12 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
 
     def _end_episodes(self, step: Step, done: BoolArray) -> list[dict[str, Any]]:
         assert step.final_observation is not None
+        assert step.final_privileged is not None
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for leg in np.flatnonzero(done):
-            final: Any = step.final_observation[leg]
-            if self._privileged:
-                assert step.final_privileged is not None
-                final = np.concatenate([final, step.final_privileged[leg]])
+            final = step.final_observation[leg], step.final_privileged[leg]
             infos[leg] = {
-                "terminal_observation": final,
+                "terminal_observation": np.concatenate(final),
                 "TimeLimit.truncated": bool(step.truncated[leg]),
                 "episode": {
                     "r": float(self._return[leg]),
@@ -81,8 +79,6 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         return infos
 
     def _observation(self, seen: Array32) -> Array32:
-        if not self._privileged:
-            return seen
         return np.concatenate([seen, self.task.privileged()], axis=1)
 
     def state(self) -> dict[str, Any]:

@@ -58,17 +58,6 @@ def test_learning_sees_what_acting_saw(every):
     assert off(one, buffer).item() > 1e-3
 
 
-def test_what_is_remembered_changes_with_updates_alone():
-    one = student(every=4)
-    memory = torch.zeros(LEGS, one.memory_size)
-    changes = []
-    for _ in range(9):
-        _, after = one(torch.ones(LEGS, SIZE), memory)
-        changes.append(not torch.equal(after[:, :8], memory[:, :8]))
-        memory = after
-    assert changes == [True, False, False, False] * 2 + [True]
-
-
 @pytest.mark.parametrize("every", [1, 2])
 def test_a_recurrent_student_learns_to_repeat_what_is_no_longer_seen(every):
     """A number is shown in the first tick of eight only, and asked for in all."""
