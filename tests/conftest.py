@@ -1,11 +1,9 @@
 """Test set-up shared by all rooms."""
 
-import functools
-import http.server
-import threading
-
 import pytest
 from hypothesis import settings
+
+from tests.browser import FLAGS, PATIENCE, find_chromium, new_page, serving
 
 settings.register_profile("steady", deadline=None, derandomize=True)
 settings.load_profile("steady")
@@ -21,29 +19,25 @@ def learners_log_where_tests_do(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def browser():
-    """A browser without a screen."""
+    """A browser without a screen and with an empty profile."""
     pytest.importorskip("viser", reason="the extra 'view' is not installed")
-    pytest.importorskip("playwright", reason="playwright is not installed")
-    from tests.browser import chromium, find_chromium
-
-    if find_chromium() is None:
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    if (path := find_chromium()) is None:
         pytest.skip("there is no Chromium on this computer")
-    with chromium() as running:
-        yield running
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=path, args=FLAGS, timeout=PATIENCE)
+        yield browser
+        browser.close()
 
 
-_HARMLESS = "Tried to update non-existent component"
-"""What viser's page says where an update and the removal of what it updates cross."""
-
-_ENDED = "ERR_ABORTED"
-"""How a request fails whose page was closed."""
+HARMLESS = ("Tried to update non-existent component", "ERR_ABORTED")
+"""What viser's page says where an update and the removal of what it updates cross, and how a
+request fails whose page was closed."""
 
 
 @pytest.fixture
 def page(browser):
     """An empty page; in the end nothing may have been complained of or loaded from afar."""
-    from tests.browser import new_page
-
     complaints, far = [], []
     page = new_page(browser)
     page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
@@ -52,23 +46,16 @@ def page(browser):
     page.on("request", lambda r: far.append(r.url) if "127.0.0.1" not in r.url else None)
     yield page
     page.close()
-    assert [
-        text for text in complaints if not text.startswith(_HARMLESS) and _ENDED not in text
-    ] == []
-    assert [url for url in far if not url.startswith(("data:", "blob:"))] == []
+    assert [text for text in complaints if not any(known in text for known in HARMLESS)] == []
+    assert [url for url in far if not url.startswith(("data:", "blob:", "file:"))] == []
 
 
 @pytest.fixture
 def foreign(browser, tmp_path):
     """A page of another site, served by this computer so that the browser alone forbids nothing."""
-    from tests.browser import new_page
-
     (tmp_path / "index.html").write_text("<p>")
-    serve = functools.partial(http.server.SimpleHTTPRequestHandler, directory=tmp_path)
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), serve) as site:
-        threading.Thread(target=site.serve_forever, daemon=True).start()
+    with serving(tmp_path) as address:
         page = new_page(browser)
-        page.goto(f"http://127.0.0.1:{site.server_port}")
+        page.goto(address)
         yield page
         page.close()
-        site.shutdown()

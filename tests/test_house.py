@@ -21,7 +21,7 @@ CEILINGS = {
     "src/hopping_leg/sim/**/*.py": (12, 2410),
     "src/hopping_leg/viewer/**/*.py": (6, 1130),
     "src/**/*.py": (178, 27300),
-    "tests/**/*.py": (137, 14170),
+    "tests/**/*.py": (137, 14090),
     "studies/**/*.py": (79, 7910),
     "docs/**/*.md": (22, 2490),
     "docs/live/*.js": (13, 1480),
