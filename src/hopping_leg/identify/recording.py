@@ -170,17 +170,15 @@ def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
     try:
         if content.startswith(_GZIP):
             content = gzip.decompress(content)
-        lines = (n for n in content.splitlines() if n.strip() and n[:1] != b"#")
-        header = next(lines, b"")
-        mark = next((m for m in "\t;" if m.encode() in header), ",")
-        fields = header.count(mark.encode())
-        short = next((k for k, n in enumerate(lines) if n.count(mark.encode()) < fields), None)
-        if short is not None:
+        lines = [n for n in content.splitlines() if n.strip() and n[:1] != b"#"]
+        mark = next((m for m in b"\t;" if m in b"".join(lines[:1])), ord(","))
+        fields = [n.count(mark) for n in lines]
+        if short := [row for row, count in enumerate(fields, -1) if count < fields[0]]:
             raise RecordingError(
-                f"{origin}: row {short} has fewer fields than the {fields + 1} of the header, as a"
-                " killed logger leaves it; delete the row."
+                f"{origin}: row {short[0]} has fewer fields than the {fields[0] + 1} of the"
+                " header, as a killed logger leaves it; delete the row."
             )
-        texts = pl.read_csv(content, separator=mark, comment_prefix="#", infer_schema=False)
+        texts = pl.read_csv(content, separator=chr(mark), comment_prefix="#", infer_schema=False)
     except (OSError, EOFError, zlib.error, *_UNREADABLE) as error:
         raise RecordingError(
             f"{origin} is no whole table of text ({str(error).partition(chr(10))[0]}); write its"
@@ -189,12 +187,11 @@ def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
     names = pl.Series(texts.columns)
     if names.str.contains("_duplicated_").any() or names.cast(float, strict=False).count():
         raise RecordingError(f"{origin} has no header, or equal names; name each of its columns.")
-    columns = []
-    for words in texts.rename(str.strip).select(pl.all().str.strip_chars().replace("", None)):
-        flags = words.str.to_lowercase().replace({"true": "1", "false": "0"})
-        numbers = flags.cast(pl.Float64, strict=False)
-        columns.append(numbers if numbers.null_count() == words.null_count() else words)
-    return pl.DataFrame(columns)
+    texts = texts.rename(str.strip).select(pl.all().str.strip_chars().replace("", None))
+    flags = pl.all().str.to_lowercase().replace({"true": "1", "false": "0"})
+    numbers = texts.select(flags.cast(pl.Float64, strict=False))
+    pairs = zip(numbers, texts, strict=True)
+    return pl.DataFrame([n if n.null_count() == t.null_count() else t for n, t in pairs])
 
 
 def _described(

@@ -58,8 +58,9 @@ class Inspection:
         """Note something strange."""
         self.warnings.append(f"{self.origin}: {sentence}.")
 
-    def set(self, column: str, values: Array) -> None:
-        """Give a column other values, (ticks,); NaN stands for nothing."""
+    def mend(self, column: str, values: Array, sentence: str) -> None:
+        """Give a column other values, (ticks,), NaN for nothing, and say why."""
+        self.warn(f"column '{column}' {sentence}")
         self.table = self.table.with_columns(pl.Series(column, values).fill_nan(None))
 
 
@@ -80,8 +81,8 @@ def check_table(inspection: Inspection) -> None:
     _check_sizes(inspection)
     _check_motion(inspection)
     _check_jumps(inspection)
-    for placed, moving in zip(PAIRS["position"], PAIRS["velocity"], strict=True):
-        _check_velocity(inspection, placed, moving)
+    for joint in range(2):
+        _check_velocity(inspection, PAIRS["position"][joint], PAIRS["velocity"][joint])
     for joint in range(2):
         _check_torque(inspection, joint)
     _warn_of_stalls(inspection)
@@ -106,8 +107,7 @@ def stalls(time: Array, period: float) -> IntArray:
 def _check_clock(inspection: Inspection) -> None:
     """Refuse time that is missing, not increasing, too coarse or in another unit."""
     time = inspection.floats("time_s")
-    bad = np.flatnonzero(~np.isfinite(time))
-    if len(bad):
+    if len(bad := np.flatnonzero(~np.isfinite(time))):
         inspection.refuse(f"column 'time_s' has no time in row {inspection.row(bad[0])}")
     _unwrap_time(inspection, time)
     steps, metadata = np.diff(time), inspection.metadata
@@ -119,12 +119,11 @@ def _check_clock(inspection: Inspection) -> None:
             f"column 'time_s' is too coarse: it counts in {tick * 1e3:.4g} ms, where a row takes"
             f" {metadata.period * 1e3:.4g}; record it to a tenth of that"
         )
-    back = np.flatnonzero(steps <= 0)
-    if len(back):
-        index = back[0] + 1
+    if len(back := np.flatnonzero(steps <= 0)):
+        before, after = time[back[0] : back[0] + 2]
         inspection.refuse(
-            f"column 'time_s' does not increase in row {inspection.row(index)}:"
-            f" {time[index]:.9g} s comes after {time[index - 1]:.9g} s; split the file there"
+            f"column 'time_s' does not increase in row {inspection.row(back[0] + 1)}:"
+            f" {after:.9g} s comes after {before:.9g} s; split the file there"
         )
     step = float(np.median(steps))
     if not 0.5 <= step * metadata.rate_hz <= _SPARSEST:
@@ -144,8 +143,7 @@ def _unwrap_time(inspection: Inspection, time: Array) -> None:
         time[index + 1 :] += turn
         wraps += turn > 0
     if wraps:
-        inspection.warn(f"column 'time_s' began anew {wraps} times; it was made to go on")
-        inspection.set("time_s", time)
+        inspection.mend("time_s", time, f"began anew {wraps} times; it was made to go on")
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -183,15 +181,12 @@ def _drop_garbage(inspection: Inspection) -> None:
         size = np.abs(values)
         garbage = ((size > 0) & (size < _TINY)) | (size > _HUGE)
         if garbage.any():
-            inspection.warn(
-                f"column '{column}' holds uninitialised memory in {garbage.sum()} rows,"
-                f" first in row {inspection.row(int(np.argmax(garbage)))}; left out"
-            )
             values[garbage] = np.nan
-            inspection.set(column, values)
+            first = inspection.row(int(np.argmax(garbage)))
+            said = f"holds uninitialised memory in {garbage.sum()} rows, first in row {first}"
+            inspection.mend(column, values, f"{said}; left out")
         if column in MEASURED and not np.nan_to_num(values).any() and (values == 0).any():
-            inspection.warn(f"column '{column}' is zero in all rows: left out")
-            inspection.set(column, np.full_like(values, np.nan))
+            inspection.mend(column, np.nan * values, "is zero in all rows: left out")
 
 
 def _drop_startup(inspection: Inspection) -> None:
@@ -226,11 +221,8 @@ _LEAST_MOTION = 0.02  # motion of the joint that moves more, rad; below it nothi
 
 def _check_motion(inspection: Inspection) -> None:
     """Refuse recordings that are too short or at rest."""
-    spans = {}
-    for column in PAIRS["position"]:
-        values = inspection.floats(column)
-        if np.count_nonzero(~np.isnan(values)) >= _LEAST_ROWS:
-            spans[column] = float(np.nanmax(values) - np.nanmin(values))
+    known = {c: v[~np.isnan(v)] for c in PAIRS["position"] for v in [inspection.floats(c)]}
+    spans = {c: float(np.ptp(values)) for c, values in known.items() if len(values) >= _LEAST_ROWS}
     if not spans:
         inspection.refuse(
             f"it is too short: {inspection.table.height} rows, and no joint has {_LEAST_ROWS}"
@@ -266,11 +258,9 @@ def _unwrap_angles(inspection: Inspection) -> None:
         if turns.any():
             values = inspection.floats(column)
             values[known[1:]] -= _TURN * np.cumsum(turns)
-            inspection.set(column, values)
-            inspection.warn(
-                f"column '{column}' wraps {np.count_nonzero(turns)} times, first before"
-                f" row {inspection.row(known[np.argmax(turns != 0) + 1])}; it was made to go on"
-            )
+            first = inspection.row(known[np.argmax(turns != 0) + 1])
+            said = f"wraps {np.count_nonzero(turns)} times, first before row {first}"
+            inspection.mend(column, values, f"{said}; it was made to go on")
 
 
 def _drop_spikes(inspection: Inspection, column: str, least: float, often: float) -> None:
@@ -284,23 +274,20 @@ def _drop_spikes(inspection: Inspection, column: str, least: float, often: float
     lasts = ndimage.maximum_filter1d(np.append(times, 0.0), around, mode="nearest")
     near = lasts < 2 * np.median(np.diff(inspection.floats("time_s")))
     leads = np.abs(seen - ndimage.median_filter(seen, around, mode="nearest")) > far
-    out = np.flatnonzero(leads & near).tolist()
-    if out:
-        rows = ", ".join(str(inspection.row(row)) for row in known[out[:5]])
-        inspection.warn(
-            f"column '{column}' leads far away and back at once in {len(out)} rows"
-            f" ({rows}{', ...' if len(out) > 5 else ''}): spikes, left out"
-        )
-        values[known[out]] = np.nan
-        inspection.set(column, values)
+    out = known[leads & near]
+    if len(out):
+        values[out] = np.nan
+        rows = ", ".join([str(inspection.row(row)) for row in out[:5]] + ["..."] * (len(out) > 5))
+        said = f"leads far away and back at once in {len(out)} rows ({rows}): spikes, left out"
+        inspection.mend(column, values, said)
 
 
 def _check_jumps(inspection: Inspection) -> None:
     """Refuse angles that jump, or are beyond the robot's mechanical stops."""
     for name, column in zip(JOINTS, PAIRS["position"], strict=True):
         known, steps, times = _steps(inspection, column)
-        leaps = np.flatnonzero(np.abs(steps) > np.maximum(_LEAP, _FASTEST * times))
-        if len(leaps):
+        jumps = np.abs(steps) > np.maximum(_LEAP, _FASTEST * times)
+        if len(leaps := np.flatnonzero(jumps)):
             inspection.refuse(
                 f"column '{column}' jumps by {steps[leaps[0]]:.3g} rad before row"
                 f" {inspection.row(known[leaps[0] + 1])} ({len(leaps)} such jumps); make it go on,"
@@ -379,10 +366,8 @@ def _check_velocity(inspection: Inspection, placed: str, moving: str) -> None:
             f" revolutions or rpm {found}; convert to rad and rad/s"
         )
     if abs(factor - 1) > _OFF or alike < _LIKE:
-        inspection.warn(
-            f"column '{moving}' is not the derivative of column '{placed}' {found}; left out"
-        )
-        inspection.set(moving, np.full(inspection.table.height, np.nan))
+        said = f"is not the derivative of column '{placed}' {found}; left out"
+        inspection.mend(moving, np.nan * velocity, said)
 
 
 _LEAST_TORQUES = 50

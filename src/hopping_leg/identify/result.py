@@ -18,13 +18,14 @@ from hopping_leg.identify.validation import Validation
 from hopping_leg.io import plain, replace_at, versions, write_atomically
 from hopping_leg.robot import COARSE_TIMESTEP, JOINTS, Robot, load_tree, robot_from_tree, robot_text
 
-_LATENCY = "reality.latency.command"
+_DELAY, _LATENCY = "drive.delay", "reality.latency.command"
 _WORSE = 1.01
 """Geometric mean of errors after the fit over those before, from which on it is worse."""
 PARAMETERS = ("parameter", "start", "identified", "95 % interval", "unit")
 """What is shown of each parameter."""
 ERRORS = ("on held-out data, rms", "before: hip", "knee", "after: hip", "knee", "unit")
 """What is shown of each kind of error."""
+_QUALITY = ("hip_before", "knee_before", "hip_after", "knee_after")
 _SHARES = ("load_friction", "ramp")
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "scipy", "cma", "polars")
 
@@ -145,21 +146,18 @@ def quality_json(identified: Identified) -> list[dict[str, Any]]:
 
     Errors of which these recordings tell nothing are left out.
     """
-    before, after = identified.start_validation, identified.validation
-    rows = [
-        ("position, closed loop", "rad", before.closed_loop_position_rms_rad,
-         after.closed_loop_position_rms_rad),
-        ("torque, closed loop", "N m", before.closed_loop_torque_rms_nm,
-         after.closed_loop_torque_rms_nm),
-    ]  # fmt: skip
-    for horizon, pair in before.open_loop_position_rms_rad.items():
+    judged = [identified.start_validation, identified.validation]
+    errors = {
+        ("position, closed loop", "rad"): [v.closed_loop_position_rms_rad for v in judged],
+        ("torque, closed loop", "N m"): [v.closed_loop_torque_rms_nm for v in judged],
+    }
+    for horizon in identified.validation.open_loop_position_rms_rad:
         name = f"position, predicted {float(horizon):g} s ahead"
-        rows.append((name, "rad", pair, after.open_loop_position_rms_rad[horizon]))
-    keys = ("hip_before", "knee_before", "hip_after", "knee_after")
+        errors[name, "rad"] = [v.open_loop_position_rms_rad[horizon] for v in judged]
     return [
-        {"error": name, "unit": unit, **dict(zip(keys, (*first, *second), strict=True))}
-        for name, unit, first, second in rows
-        if any(map(math.isfinite, (*first, *second)))
+        {"error": name, "unit": unit, **dict(zip(_QUALITY, (*before, *after), strict=True))}
+        for (name, unit), (before, after) in errors.items()
+        if np.isfinite([before, after]).any()
     ]
 
 
@@ -168,7 +166,7 @@ def warning(identified: Identified) -> str:
     rows = quality_json(identified)
     pairs = [(row[f"{j}_before"], row[f"{j}_after"]) for row in rows for j in JOINTS]
     known = [math.log(after / before) for before, after in pairs if before > 0 and after > 0]
-    ratio = math.exp(sum(known) / len(known)) if known else 1.0
+    ratio = math.exp(sum(known) / max(len(known), 1))
     if ratio < _WORSE:
         return ""
     return (
@@ -193,9 +191,9 @@ def parameters_json(identified: Identified) -> list[dict[str, Any]]:
             "unit": p.unit,
             "value": value,
             "interval_low": max(value - half, 0.0 if p.low >= 0 else -math.inf),
-            "interval_high": min(value + half, 1.0 if p.name.endswith(_SHARES) else math.inf)
-            if math.isfinite(half)
-            else half,
+            "interval_high": min(value + half, 1.0)
+            if math.isfinite(half) and p.name.endswith(_SHARES)
+            else value + half,
             "scale": p.scale,
             "start": first.get(p.name, identified.start.get(p.name)),
             "bound_low": p.low,
@@ -227,9 +225,7 @@ def shown_errors(identified: Identified) -> list[tuple[str, ...]]:
     rows = []
     for row in quality_json(identified):
         unit, factor = ("mrad", 1e3) if row["unit"] == "rad" else (row["unit"], 1.0)
-        values = [
-            factor * row[f"{joint}_{when}"] for when in ("before", "after") for joint in JOINTS
-        ]
+        values = [factor * row[key] for key in _QUALITY]
         shown = (f"{value:.3g}" if math.isfinite(value) else "-" for value in values)
         rows.append((row["error"], *shown, unit))
     return rows
@@ -255,17 +251,12 @@ def save_robot(identified: Identified, path: Path, origin: str | Path) -> None:
     tree["name"] = path.stem
     tree["description"] = f"{identified.start.robot.name}, identified from recordings"
     for row in parameters_json(identified):
-        place = _place(row["name"])
-        if place.startswith("drive.") or (place == _LATENCY and not row["value"] > 0):
-            continue
-        entry = {"value": row["value"], "unit": row["unit"], "source": _source(row)}
-        tree = replace_at(tree, place, entry)
+        delays = row["name"] == _DELAY
+        if not row["name"].startswith("drive.") or (delays and row["value"] > 0):
+            entry = {"value": row["value"], "unit": row["unit"], "source": _source(row)}
+            tree = replace_at(tree, _LATENCY if delays else row["name"], entry)
     robot_from_tree(tree, str(path))
     write_atomically(path, robot_text(tree, _comment(identified, str(origin))).encode())
-
-
-def _place(name: str) -> str:
-    return _LATENCY if name == "drive.delay" else name
 
 
 def provenance(identified: Identified) -> list[str]:
@@ -282,7 +273,8 @@ def provenance(identified: Identified) -> list[str]:
 
 def _comment(identified: Identified, origin: str) -> str:
     """Return what stands above the tables: provenance, quality, and the drives' numbers."""
-    drives = [r for r in parameters_json(identified) if _place(r["name"]).startswith("drive.")]
+    numbers = [r for r in parameters_json(identified) if r["name"] != _DELAY]
+    drives = [r for r in numbers if r["name"].startswith("drive.")]
     lines = [
         warning(identified),
         f"Identified by `hop identify` from {origin}; numbers without 'identified' are its.",
@@ -297,6 +289,6 @@ def _comment(identified: Identified, origin: str) -> str:
 def _source(row: dict[str, Any]) -> str:
     low, high, unit = row["interval_low"], row["interval_high"], row["unit"]
     at_bound = "; at a bound of its search" if row["at_bound"] else ""
-    if not abs(high - low) < float("inf"):
+    if not math.isfinite(high - low):
         return f"identified, but these data say nothing about it; start {row['start']:.6g}"
     return f"identified: 95 % {low:.6g} to {high:.6g} {unit}, start {row['start']:.6g}{at_bound}"

@@ -40,7 +40,7 @@ def validate(
     RecordingError says that a recording is too short to judge anything.
     """
     controlled = [r for r in recordings if r.metadata.onboard != "torque"]
-    windows = cut(controlled, None, unscored=_unscored(recordings))
+    windows = cut(controlled, unscored=_unscored(recordings))
     position, torque = _errors(controlled, windows, hypothesis, threads, "position", "torque")
     ahead = {str(h): open_loop(recordings, hypothesis, h, threads) for h in HORIZONS}
     return Validation(position, torque, ahead)
