@@ -8,6 +8,7 @@ import pytest
 
 from hopping_leg.errors import PhysicsError, RecordingError, RobotError
 from hopping_leg.identify import pipeline
+from hopping_leg.identify.optimizers import Found, Pass
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import identify
 from hopping_leg.identify.plan import make_plan
@@ -78,24 +79,12 @@ def test_a_cluster_changes_no_bit():
         assert as_json(here) == as_json(there)
 
 
-@pytest.fixture
-def ending_high(monkeypatch):
-    """Let every search end at its upper bounds."""
-    searched = pipeline.search
+def test_a_fit_that_breaks_down_is_no_result(monkeypatch):
+    def ending_high(plan, *_, **__):
+        upper = plan.parameters.bounds[1]
+        return [Pass("", plan.parameters, Found(upper, 1.0, 1, [1.0]))]
 
-    def high(*args, **options):
-        (one,) = searched(*args, **options)
-        return [
-            dataclasses.replace(
-                one, found=dataclasses.replace(one.found, vector=one.parameters.bounds[1])
-            )
-        ]
-
-    monkeypatch.setattr(pipeline, "search", high)
-
-
-@pytest.mark.usefixtures("ending_high")
-def test_a_fit_that_breaks_down_is_no_result():
+    monkeypatch.setattr(pipeline, "search", ending_high)
     name = "drive.hip.stiffness"
     chosen = options(parameters=(name,), bounds={name: (0.0, 1e12)})
     strong = run().with_metadata(gains_exact=False, onboard="continuous", torque_limit=(1e12, 1e12))
@@ -103,16 +92,6 @@ def test_a_fit_that_breaks_down_is_no_result():
     robot = dataclasses.replace(LEG, hip=dataclasses.replace(LEG.hip, motor=motor))
     with pytest.raises(PhysicsError, match="The fit failed"):
         identify([strong], robot, options=chosen)
-
-
-@pytest.mark.parametrize(
-    ("onboard", "what"), [("torque", "commanded torques"), ("continuous", "targets of its")]
-)
-def test_without_commands_there_is_nothing_to_simulate(onboard, what):
-    commands = [column for column in run().trace.table.columns if "command" in column]
-    mute = changed(run(), **dict.fromkeys(commands)).with_metadata(onboard=onboard)
-    with pytest.raises(RecordingError, match=f"has no {what}"):
-        identify([mute], LEG, options=options())
 
 
 @pytest.mark.parametrize("joint", ["hip", "knee"])
@@ -172,29 +151,27 @@ def test_a_plan_has_short_windows_where_nothing_holds_the_leg_and_begins_at_doub
     assert "thigh.inertia" in papers.parameters.names
 
 
-OF_A_JOINT = ("position", "velocity", "torque", "position_command", "velocity_command")
+ANGLES = ("position", "position_command")
+OF_A_JOINT = (*ANGLES, "velocity", "torque", "velocity_command")
+COMMANDS = ("position_command", "velocity_command")
 
 
 @pytest.mark.parametrize("joint", [0, 1])
-@pytest.mark.parametrize("names", [OF_A_JOINT, ("torque",)], ids=["joint", "torque"])
-def test_a_joint_in_a_mirror_and_a_torque_against_its_motion_are_refused(names, joint):
-    mirrored = changed(tracked(), -pl.col([PAIRS[name][joint] for name in names]))
-    with pytest.raises(RecordingError, match="sign"):
-        identify([mirrored], LEG, options=options())
-
-
-@pytest.mark.parametrize("turns", [1, 2])
-@pytest.mark.parametrize("joint", [0, 1])
-def test_a_zero_elsewhere_is_refused(joint, turns):
-    columns = [PAIRS[name][joint] for name in ("position", "position_command")]
-    turned = changed(tracked(), pl.col(columns) + turns * np.pi / 2)
-    with pytest.raises(RecordingError, match="zero"):
-        identify([turned], LEG, options=options())
-
-
-@pytest.mark.parametrize("joint", ["hip", "knee"])
-def test_one_joint_alone_is_refused_before_any_fit(joint):
-    lacking = PAIRS["position"][joint == "knee"]
-    run = changed(tracked(), pl.lit(None, pl.Float64).alias(lacking))
-    with pytest.raises(RecordingError, match=f"no positions of the {joint}.*both joints"):
-        identify([run], LEG, options=options())
+@pytest.mark.parametrize(
+    ("names", "change", "onboard", "sentence"),
+    [
+        (OF_A_JOINT, lambda column: -column, "zoh", "sign"),
+        (("torque",), lambda column: -column, "zoh", "sign"),
+        (ANGLES, lambda column: column + np.pi / 2, "zoh", "zero"),
+        (ANGLES, lambda column: column + np.pi, "zoh", "zero"),
+        (("position",), lambda column: column * None, "zoh", "no positions of the .*both joints"),
+        (COMMANDS, lambda column: column * None, "torque", "has no commanded torques"),
+        (COMMANDS, lambda column: column * None, "continuous", "has no targets of its"),
+    ],
+)
+def test_what_cannot_be_the_leg_is_refused_before_any_fit(names, change, onboard, sentence, joint):
+    joints = (0, 1) if names is COMMANDS else (joint,)
+    columns = pl.col([PAIRS[name][j] for name in names for j in joints])
+    wrong = changed(tracked(), change(columns)).with_metadata(onboard=onboard)
+    with pytest.raises(RecordingError, match=sentence):
+        identify([wrong], LEG, options=options())

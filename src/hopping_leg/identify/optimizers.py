@@ -233,16 +233,33 @@ def search(
     The objective costs the plan's parameters. ``ray`` is the address of a Ray cluster that
     simulates, ``local`` for one on this machine.
     """
-    run = partial(_run_pass, plan, objective, options, seed, ray)
+    threads = objective.threads if ray is None else 1
+    cluster = None if ray is None else workers.RayWorkers(ray)
+
+    def spread(evaluate: Evaluate) -> Evaluate:
+        return evaluate if cluster is None else partial(workers.map_rows, cluster, evaluate)
+
+    def run(name: str, parameters: ParameterSet, begin: float = 0.0, share: float = 1.0) -> Pass:
+        def progress(done: float, cost: float) -> None:
+            report(name, begin + share * done, cost)
+
+        goal = replace(objective, parameters=parameters, threads=threads)
+        values, residuals = spread(goal), spread(goal.residuals)
+        if plan.search == "least-squares":
+            effort = (parameters, goal.loss, options)
+            found = least_squares(residuals, *effort, groups=goal.jumping, report=progress)
+        else:
+            hands = deal(goal, options.seconds, np.random.default_rng(seed))
+            shares = [spread(replace(goal, windows=hand)) for hand in hands]
+            found = cma_es(values, parameters, options, seed=seed, shares=shares, report=progress)
+        return Pass(name, parameters, found)
+
     if plan.search != "two-pass":
-        return [run(plan.search, plan.parameters, report)]
+        return [run(plan.search, plan.parameters)]
     _, added = pass_names([r.metadata.rig for r in objective.recordings])
     kept = tuple(p for p in plan.parameters.parameters if p.name not in added)
-    first, second = (
-        lambda stage, share, cost, n=n: report(stage, (n + share) / 2, cost) for n in (0, 1)
-    )
-    found = run("two-pass, first", replace(plan.parameters, parameters=kept), first)
-    return [found, run("two-pass, second", second_pass(plan.parameters, found), second)]
+    first = run("two-pass, first", replace(plan.parameters, parameters=kept), 0.0, 0.5)
+    return [first, run("two-pass, second", second_pass(plan.parameters, first), 0.5, 0.5)]
 
 
 def second_pass(every: ParameterSet, first: Pass) -> ParameterSet:
@@ -253,39 +270,9 @@ def second_pass(every: ParameterSet, first: Pass) -> ParameterSet:
         starts[p.name] = value
         if not p.name.startswith("drive."):
             reach = 0.1 * p.scale
-            low = max(p.low, min(value / _FACTOR, value * _FACTOR, value - reach))
-            high = min(p.high, max(value / _FACTOR, value * _FACTOR, value + reach))
-            bounds[p.name] = (low, high)
+            near = (value / _FACTOR, value * _FACTOR, value - reach, value + reach)
+            bounds[p.name] = (max(p.low, min(near)), min(p.high, max(near)))
     return choose(every.base, every.names, bounds=bounds, start=starts)
-
-
-def _run_pass(
-    plan: FitPlan,
-    objective: Objective,
-    options: SearchOptions,
-    seed: int,
-    ray: str | None,
-    name: str,
-    parameters: ParameterSet,
-    report: Report,
-) -> Pass:
-    progress = partial(report, name)
-    threads = objective.threads if ray is None else 1
-    objective = replace(objective, parameters=parameters, threads=threads)
-    cluster = None if ray is None else workers.RayWorkers(ray)
-
-    def spread(evaluate: Evaluate) -> Evaluate:
-        return evaluate if cluster is None else partial(workers.map_rows, cluster, evaluate)
-
-    if plan.search == "least-squares":
-        residuals, loss, groups = spread(objective.residuals), objective.loss, objective.jumping
-        found = least_squares(residuals, parameters, loss, options, groups=groups, report=progress)
-        return Pass(name, parameters, found)
-    hands = deal(objective, options.seconds, np.random.default_rng(seed))
-    shares = [spread(replace(objective, windows=hand)) for hand in hands]
-    values = spread(objective)
-    found = cma_es(values, parameters, options, seed=seed, shares=shares, report=progress)
-    return Pass(name, parameters, found)
 
 
 def deal(

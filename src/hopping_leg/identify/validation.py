@@ -77,8 +77,14 @@ def _errors(
     if not windows:
         return [(np.nan, np.nan)] * len(quantities)
     simulator = WindowSimulator(recordings, windows, threads=threads)
-    simulated = simulator.run([hypothesis])
-    return [rms(getattr(simulated, q)[0] - measured(simulator, q)) for q in quantities]
+    simulated, pairs = simulator.run([hypothesis]), list[Pair]()
+    for quantity in quantities:
+        errors = (getattr(simulated, quantity)[0] - measured(simulator, quantity)).reshape(-1, 2)
+        counts = np.count_nonzero(~np.isnan(errors), axis=0)
+        with np.errstate(invalid="ignore"):
+            hip, knee = np.sqrt(np.nansum(np.square(errors), axis=0) / counts).tolist()
+        pairs.append((hip, knee))
+    return pairs
 
 
 def as_torque_driven(recording: Recording) -> Recording:
@@ -107,15 +113,6 @@ def _starts_known(recordings: Sequence[Recording], window: Window) -> bool:
         return False
     state = recording.array("position")[window.start], recording.array("velocity")[window.start]
     return bool(np.isfinite(state).all()) or recording.has("position_estimate")
-
-
-def rms(errors: Array) -> Pair:
-    """Return the root mean square over everything but the joint, the last axis, ignoring NaN."""
-    flat = errors.reshape(-1, 2)
-    counts = np.count_nonzero(~np.isnan(flat), axis=0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        hip, knee = np.sqrt(np.nansum(np.square(flat), axis=0) / counts)
-    return float(hip), float(knee)
 
 
 def _unscored(recordings: Sequence[Recording]) -> float:
