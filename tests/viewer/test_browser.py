@@ -69,7 +69,8 @@ def picture(page):
 
 
 def share_of_the_motors(drawn):
-    return ((drawn[..., 1] > 110) & (drawn[..., 0] < 90)).mean()
+    """Return how much of a picture has energy shaping's orange."""
+    return ((drawn[..., 0] > 180) & (drawn[..., 2] < 60)).mean()
 
 
 def test_the_leg_is_drawn_and_what_the_page_offers_changes_it_while_it_hops(page):
