@@ -15,6 +15,7 @@ from hopping_leg.identify.recording import Recording, load_recording
 from hopping_leg.robot import load_robot
 from hopping_leg.trace import COLUMNS as TRACED
 from hopping_leg.trace import Trace
+from tests.extras import run_without
 from tests.identify.runs import METADATA, SIDECAR, swinging
 
 pytest.importorskip("mcap_ros2", reason="the extra 'ros' is not installed")
@@ -172,3 +173,5 @@ def test_a_file_lies_beside_its_trace_or_in_a_folder(tmp_path):
     assert main(words) == main([*words, "--out", str(tmp_path / "out")]) == 0
     assert (tmp_path / "run.mcap").stat().st_size > 1000
     assert (tmp_path / "out/run.mcap").exists()
+    code = f"from hopping_leg.cli import main; sys.exit(main({words}))"
+    assert "pip install 'hopping-leg[ros]'" in run_without(("mcap", "mcap_ros2"), code).stderr

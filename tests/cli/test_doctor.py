@@ -12,7 +12,6 @@ HARDWARE = "pip install 'hopping-leg[hardware]'"
         (["doctor"], 0, "compiled code: "),
         (["emulate", "--kinds"], 0, "late_reply"),
         (["train"], 2, "pip install 'hopping-leg[train]'"),
-        (["export", "traces", "run.parquet"], 2, "pip install 'hopping-leg[ros]'"),
         (["emulate"], 2, HARDWARE),
         (["doctor", "--transport", "/dev/null"], 2, HARDWARE),
         (["deploy", "energy-shaping", "--transport", "/dev/null"], 2, HARDWARE),
