@@ -20,7 +20,7 @@ COMMAND = re.compile(r"^```sh\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 SHORT = {
     "train": "--steps 512 --heights 0.28 0.32"
-    " --set num_envs=8 n_steps=32 batch_size=64 log_every=1 calibrations=1",
+    " --set num_envs=8 batch_size=64 log_every=1 calibrations=1",
     "evaluate": "--commands 0.3 --seeds 1 --floor soft --no-video",
     "robustness": "--commands 0.3 --seeds 1",
 }
