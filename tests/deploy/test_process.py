@@ -109,7 +109,7 @@ def test_a_second_signal_ends_the_process_within_a_second(emulator, tmp_path, co
         began = time.monotonic()
         process.send_signal(signal.SIGTERM)
         _, error = process.communicate(timeout=60)
-    assert time.monotonic() - began < 5.0  # a second, and what a busy computer adds
+    assert time.monotonic() - began < 1.5
     assert process.returncode == 2, error
     assert "Traceback" not in error
     time.sleep(0.3)
