@@ -1,12 +1,14 @@
 """The stepper is MuJoCo, to rounding, and what it does beyond is as stated."""
 
+import dataclasses
+
 import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hopping_leg.robot import JOINTS, DriveMismatch, get_spec, load_robot
+from hopping_leg.robot import JOINTS, Boom, DriveMismatch, get_spec, load_robot
 from hopping_leg.sim import LegSimulator, leg_physics
 from hopping_leg.sim.compiled import compiled
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, Range, sample
@@ -47,6 +49,17 @@ def add_transmission(spec, name, drive):
     joint.limited = False
 
 
+def add_boom(spec, boom):
+    """Let the base move forward, too, and add the boom's inertias."""
+    rail = spec.joint("rail")
+    rail.armature, rail.damping = boom.mass, [boom.damping, 0, 0]
+    rail.frictionloss = boom.friction
+    ahead = spec.body("base").add_joint(
+        name="ahead", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1, 0, 0]
+    )
+    ahead.armature = boom.forward_mass
+
+
 class Reference:
     """Legs in MuJoCo with a tight tolerance, built for these tests alone."""
 
@@ -58,9 +71,12 @@ class Reference:
             if self.elastic:
                 for name in JOINTS:
                     add_transmission(spec, name, getattr(robot.reality, name))
+            if robot.boom.radius:
+                add_boom(spec, robot.boom)
             model = tight_model(spec)
             self.legs.append((model, mujoco.MjData(model)))
-        self.rail = [] if fixed_base else [0]
+        self.rail = [] if fixed_base else [model.joint("rail").dofadr[0]]
+        self.ahead = [model.joint("ahead").dofadr[0]] if robots[0].boom.radius else []
         self.motors = [model.joint(name).dofadr[0] for name in JOINTS]
         self.links = [model.joint(f"{n}_link").dofadr[0] for n in JOINTS] if self.elastic else []
 
@@ -92,7 +108,7 @@ class Reference:
             data.ctrl[:] = asked / robot.of_joints("belt_ratio")
             load = robot.of_joints("load_friction") * np.abs(asked)
             model.dof_frictionloss[self.motors] = robot.of_joints("friction") + load
-            data.qfrc_applied[self.rail] = force
+            data.qfrc_applied[self.rail] = force - robot.boom.weight
             stiffness, half = (robot.reality.of_drives(n) for n in ("stiffness", "backlash"))
             for _ in range(substeps if self.elastic else 1):
                 if self.elastic:
@@ -118,6 +134,7 @@ def worst_difference(robots, ticks, timestep=5e-4, *, fixed_base=False, seed=0):
     legs.q[:] = np.stack([rng.uniform(-0.5, 1.5, count), rng.uniform(-2.75, 0.2, count)], 1)
     legs.state[:, 3:] = rng.normal(0, 1, (count, 3)) * [not fixed_base, 1, 1]
     legs.forget(slice(None))
+    forward = legs.records["forward"]
     limit = robots[0].of_joints("torque_limit")
     worst, seen = 0.0, dict.fromkeys(("foot", "knee", "base", "stop", "still"), 0)
     for tick in range(ticks):
@@ -126,6 +143,8 @@ def worst_difference(robots, ticks, timestep=5e-4, *, fixed_base=False, seed=0):
             legs.forget(slice(None))
         memory = legs.memory()["memory"]
         reference.set_state(legs.state, memory[:, :4])
+        for (_, data), speed in zip(reference.legs, forward, strict=True):
+            data.qvel[reference.ahead] = speed
         pushing = (legs.height < 0.22)[:, None]
         torque = np.where(pushing, [-6.0, 6.0], 8 * ([0.7, -1.4] - legs.q) - 0.2 * legs.qd)
         torque = (torque + rng.normal(0, 1, (count, 2))).clip(-limit, limit)
@@ -139,6 +158,8 @@ def worst_difference(robots, ticks, timestep=5e-4, *, fixed_base=False, seed=0):
         scale = np.maximum(1, np.abs(found).max(axis=1, keepdims=True))
         difference = np.abs(np.concatenate([legs.state, rotor], 1) - found)
         worst = max(worst, (difference / scale).max())
+        for (_, data), speed in zip(reference.legs, forward, strict=True):
+            worst = max([worst, *np.abs(data.qvel[reference.ahead] - speed)])
         for part in ("foot", "knee", "base"):
             seen[part] += np.count_nonzero(getattr(legs, f"{part}_clearance")() < 0)
         seen["stop"] += np.count_nonzero(legs.loads[:, 7])
@@ -149,7 +170,11 @@ def worst_difference(robots, ticks, timestep=5e-4, *, fixed_base=False, seed=0):
 
 def randomised(name, count, seed=0, **reality):
     ranges = IDENTIFIABLE_RANGES + tuple(r for r in WIDE_RANGES if "reality" not in r.path)
-    base = with_reality(load_robot(name), **reality) if reality else load_robot(name)
+    base = load_robot(name)
+    if "boom" in reality:
+        base = dataclasses.replace(base, **reality)
+    elif reality:
+        base = with_reality(base, **reality)
     robots = sample(base, ranges + FURTHER, count, np.random.default_rng(seed))
     return [with_strong_motors(with_joints(robot, torque_gain=1.0)) for robot in robots]
 
@@ -160,6 +185,10 @@ ELASTIC = {
 }
 
 
+BOOM = {"boom": Boom(1e9, 0.0, 0.8, 0.6, -4.0, 0.5, 1.0)}
+"""Its arc is a straight line."""
+
+
 @pytest.mark.parametrize(
     ("name", "reality", "fixed_base", "count", "timestep"),
     [
@@ -168,6 +197,7 @@ ELASTIC = {
         ("legv2", {}, True, 16, 5e-4),
         ("legv2", ELASTIC, False, 16, 5e-4),
         ("legv2", ELASTIC, True, 16, 5e-4),
+        ("legv2", BOOM, False, 16, 5e-4),
         *(
             pytest.param(*case, marks=pytest.mark.slow)
             for case in (
@@ -187,29 +217,36 @@ def test_the_stepper_is_mujoco_for_legs_of_any_kind(name, reality, fixed_base, c
 
 
 @compiled
-def acceleration(m, force, friction, rows, count, start):
+def acceleration(m, force, moving, friction, rows, count, start):
     """Return the same as the function that is compiled into others; kept between sessions."""
-    return leg_physics.constrained_acceleration(m, force, friction, rows, count, start)
+    return leg_physics.constrained_acceleration(
+        m, force, moving, friction, rows, count, start, moving[1] > 0
+    )
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(0, leg_physics.ROWS), st.integers(0, 7))
+@given(
+    st.integers(0, 2**32 - 1), st.integers(0, leg_physics.ROWS), st.integers(0, 7), st.booleans()
+)
 @settings(max_examples=300)
-def test_the_acceleration_obeys_gauss_principle(seed, count, sliding):
+def test_the_acceleration_obeys_gauss_principle(seed, count, sliding, boom):
     """At the minimum, mass times acceleration is force plus what the constraints give."""
-    rng = np.random.default_rng(seed)
-    root = (rng.normal(0, 1, (3, 3)) + 2 * np.eye(3)) * 10 ** rng.uniform(-1, 0, (3, 1))
-    mass, (force, start) = root @ root.T, rng.normal(0, [[100.0], [1000.0]], (2, 3))
+    rng, n = np.random.default_rng(seed), 3 + boom
+    root = (rng.normal(0, 1, (n, n)) + 2 * np.eye(n)) * 10 ** rng.uniform(-1, 0, (n, 1))
+    mass, (force, start) = root @ root.T, rng.normal(0, [[100.0], [1000.0]], (2, n))
     loss = np.where([sliding >> i & 1 for i in range(3)], 10 ** rng.uniform(-2, 2, 3), 0.0)
     stiff, rest = 10 ** rng.uniform(0, 3, 3), rng.normal(0, 100, 3)
-    rows = np.zeros((leg_physics.ROWS, 5))
-    rows[:count] = rng.normal(0, 1, (count, 5)) * [1, 1, 1, 100, 0]
+    rows = np.zeros((leg_physics.ROWS, leg_physics.ROW))
+    rows[:count] = rng.normal(0, 1, (count, 6)) * [1, 1, 1, 100, 0, boom]
     rows[:count, 4] = 10 ** rng.uniform(-1, 3, count)
     friction = tuple(map(tuple, (loss, stiff, rest, loss / stiff)))
-    numbers = tuple(mass[np.triu_indices(3)])
-    a = acceleration(numbers, tuple(force), friction, rows, count, tuple(start))
-    miss = np.minimum(rows[:count, :3] @ a - rows[:count, 3], 0.0)
-    given_by_rows = -(rows[:count, 4] * miss) @ rows[:count, :3]
-    given_by_friction = np.clip(-stiff * (a - rest), -loss, loss)
+    numbers, start = tuple(mass[:3, :3][np.triu_indices(3)]), np.append(start, 0.0)[:4]
+    moving = (tuple(mass[:3, 3]), mass[3, 3], force[3]) if boom else ((0.0, 0.0, 0.0), 0.0, 0.0)
+    found = acceleration(numbers, tuple(force[:3]), moving, friction, rows, count, tuple(start))
+    a, pushing = np.array(found[:n]), rows[:count, [0, 1, 2, 5][:n]]
+    miss = np.minimum(pushing @ a - rows[:count, 3], 0.0)
+    given_by_rows = -(rows[:count, 4] * miss) @ pushing
+    given_by_friction = np.zeros(n)
+    given_by_friction[:3] = np.clip(-stiff * (a[:3] - rest), -loss, loss)
     residual = mass @ a - force - given_by_rows - given_by_friction
     scale = np.abs(mass) @ np.abs(a) + np.abs(force) + np.abs(given_by_rows)
     assert (np.abs(residual) <= 1e-8 * scale.max()).all()

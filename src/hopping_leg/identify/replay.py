@@ -16,7 +16,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, Record, Records
 from hopping_leg.sim.compiled import compiled, inlined
-from hopping_leg.sim.leg_physics import ROWS
+from hopping_leg.sim.leg_physics import ROW, ROWS
 from hopping_leg.sim.stepper import MEMORY, asked, motor_torque, step_leg
 
 TORQUE, ZOH, CONTINUOUS = range(3)
@@ -114,7 +114,7 @@ def _replay_window(
     memory.motor_torque[:] = 0
     memory.rotor[0], memory.rotor[1] = state[1], state[2]
     memory.rotor[2], memory.rotor[3] = state[4], state[5]
-    scratch, none = np.empty((ROWS, 5)), np.empty((0, 6))
+    scratch, none = np.empty((ROWS, ROW)), np.empty((0, 6))
     seen, target, integral = np.empty(4), np.zeros(2), np.zeros(2)
     zoh, delay = onboard == ZOH, drive.delay
     start, length, dt = span.start, span.length, timestep

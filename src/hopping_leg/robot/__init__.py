@@ -24,7 +24,7 @@ from hopping_leg.robot.model_mismatch import (
     GroundMismatch,
     Latency,
 )
-from hopping_leg.robot.parameters import JOINTS, Joint, Link, Robot
+from hopping_leg.robot.parameters import JOINTS, Boom, Joint, Link, Robot
 from hopping_leg.robot.robot_checks import check_physics, numbers
 from hopping_leg.robot.robot_files import (
     DEFAULT_ROBOT,
@@ -50,6 +50,7 @@ __all__ = [
     "REGISTER_MAP",
     "STANDING_NOISE",
     "TIMESTEP",
+    "Boom",
     "DriveMismatch",
     "GroundMismatch",
     "Hardware",

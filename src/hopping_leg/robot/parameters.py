@@ -45,6 +45,42 @@ class Rail:
     friction: float = field(metadata={"unit": "N", "zero": True})
     """Coulomb friction."""
     damping: float = field(metadata={"unit": "N s/m", "zero": True})
+    slider: float = quantity("kg", 0.0, zero=True)
+    """Mass of the slider, a part of the base's."""
+
+
+@dataclass(frozen=True)
+class Boom:
+    """A boom that carries the leg instead of the rail: the base moves on an arc, and forward.
+
+    Its masses resist the leg at the tip by (m r^2 + I) / R^2, up and forward, and weigh g m r / R
+    there. Mass, forward mass and weight are what there is beyond them. The rail's slider stays on
+    the rail.
+    """
+
+    radius: float = quantity("m", 0.0, zero=True)
+    """R, from the pivot to the leg; zero where the leg is on the rail."""
+    pivot: float = quantity("m", 0.0, zero=True)
+    """Height of the pivot above the ground."""
+    mass: float = quantity("kg", 0.0, signed=True)
+    forward_mass: float = quantity("kg", 0.0, signed=True)
+    weight: float = quantity("N", 0.0, signed=True)
+    friction: float = quantity("N", 0.0, zero=True)
+    """Coulomb friction of its joints, at the tip."""
+    damping: float = quantity("N s/m", 0.0, zero=True)
+    masses: tuple[tuple[float, float, float], ...] = ()
+    """Of each part without the leg: mass m, kg, distance r from the pivot, m, negative for a
+    counterweight, and inertia I about its centre of mass, kg m2."""
+
+    @property
+    def inertia(self) -> float:
+        """What its masses resist with at the tip, kg."""
+        return sum(m * r * r + i for m, r, i in self.masses) / max(self.radius, 1e-9) ** 2
+
+    @property
+    def moment(self) -> float:
+        """What its masses hang at the tip, kg."""
+        return sum(m * r for m, r, _ in self.masses) / max(self.radius, 1e-9)
 
 
 @dataclass(frozen=True)
@@ -156,6 +192,8 @@ class Robot:
     hip: Joint
     knee: Joint
     description: str = ""
+    boom: Boom = field(default_factory=Boom)
+    """What carries the leg, if it is no rail."""
     kind: str = "leg"
     """``leg``, whose knee bends to the negative side, or ``pendulum``, which swings freely."""
     reality: ModelMismatch = field(default_factory=ModelMismatch)
@@ -219,6 +257,8 @@ class Robot:
         del values["name"], values["description"], values["kind"], values["hardware"]
         if self.reality.neutral:
             del values["reality"]
+        if self.boom == Boom():
+            del values["boom"], values["rail"]["slider"]
         for link in ("thigh", "shank"):
             del values[link]["extent"]
         for joint, name in itertools.product(JOINTS, ("load_friction", "torque_gain")):

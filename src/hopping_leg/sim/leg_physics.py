@@ -15,6 +15,10 @@ velocity, and the position follows the new velocity (``implicitfast``).
 A joint with an elastic transmission has a rotor of its own that carries armature, friction and
 damping; a spring with a dead band and a damper tie it to the link, and nothing else does.
 
+On a boom the base moves forward, too: a fourth coordinate y, which only contacts and the links'
+inertia tie to the others, M y'' + c . (x'', q1'', q2'') = f. What takes ``forward`` leaves it out
+where that is False, which the compiler knows; y itself acts on nothing, so that none is kept.
+
 ``p`` is a row of the leg's table (``leg_table``), vectors and matrices are tuples, a symmetric
 matrix is (m00, m01, m02, m11, m12, m22). Lengths are in m, masses in kg, angles in rad, in SI units
 throughout; torques are the joint's.
@@ -25,11 +29,16 @@ import numpy as np
 from hopping_leg.arrays import Array, Record
 from hopping_leg.sim.compiled import inlined
 
-ROWS = 11
-"""Constraints at most, besides dry friction: three per contact, one per joint at its stop."""
+ROWS, ROW = 11, 6
+"""Constraints at most, besides dry friction: three per contact, one per joint at its stop; numbers
+of each, (J, r, D, J_y)."""
 
 Vector = tuple[float, float, float]
+Four = tuple[float, float, float, float]
 Symmetric = tuple[float, float, float, float, float, float]
+
+Forward = tuple[Vector, float, float]
+"""Of y: coupling c, mass M, and force f."""
 
 Friction = tuple[Vector, Vector, Vector, Vector]
 """Dry frictions: force F (zero for none), D, r, and the bound F / D beyond which they slide."""
@@ -70,6 +79,14 @@ def solve(m: Symmetric, b: Vector) -> Vector:
 
 
 @inlined
+def solve_forward(m: Symmetric, c: Vector, mass: float, b: Vector, pull: float) -> Four:
+    """Solve M x + c y = b, c . x + ``mass`` y = ``pull`` for (x, y)."""
+    p, q = solve(m, b), solve(m, c)
+    y = (pull - dot(c, p)) / (mass - dot(c, q))
+    return p[0] - q[0] * y, p[1] - q[1] * y, p[2] - q[2] * y, y
+
+
+@inlined
 def times(m: Symmetric, x: Vector) -> Vector:
     """Return M x."""
     return (
@@ -104,10 +121,11 @@ def add_contact(
     normal: Vector,
     tangent: Vector,
     speed: Vector,
+    drift: float,
 ) -> int:
     """Add a contact's edges of the friction pyramid to ``rows``; return the new count.
 
-    Rows are (J, r, D). Out of the leg's plane nothing slides, so that two edges are one.
+    Out of the leg's plane nothing slides, so that two edges are one. ``drift`` is the velocity y'.
     """
     imp, mu = impedance(gap), p.ground_friction
     stiffness = 1 / ((1 - imp) / imp * 2 * mu * mu * (1 + mu * mu) * softness)
@@ -119,8 +137,9 @@ def add_contact(
         row[1] = normal[1] + slope * tangent[1]
         row[2] = normal[2] + slope * tangent[2]
         rate = row[0] * speed[0] + row[1] * speed[1] + row[2] * speed[2]
-        row[3] = spring - p.contact_damping * rate
+        row[3] = spring - p.contact_damping * (rate + slope * drift)
         row[4] = 2 * stiffness if edge == 0 else stiffness
+        row[5] = slope
     return count + 3
 
 
@@ -134,6 +153,7 @@ def add_contacts(
     c1: float,
     s12: float,
     c12: float,
+    drift: float,
 ) -> int:
     """Set the rows of base, knee and foot where they touch the ground; return how many.
 
@@ -147,16 +167,16 @@ def add_contacts(
     if gap < 0:
         at = foot_z - p.foot_radius - gap / 2
         normal, tangent = (1.0, foot_x, foot_x - knee_x), (0.0, -at, knee_z - at)
-        count = add_contact(p, rows, count, gap, p.shank_softness, normal, tangent, speed)
+        count = add_contact(p, rows, count, gap, p.shank_softness, normal, tangent, speed, drift)
     gap = height + knee_z - p.knee_radius
     if gap < 0:
         at = knee_z - p.knee_radius - gap / 2
         normal, tangent = (1.0, knee_x, 0.0), (0.0, -at, knee_z - at)
-        count = add_contact(p, rows, count, gap, p.shank_softness, normal, tangent, speed)
+        count = add_contact(p, rows, count, gap, p.shank_softness, normal, tangent, speed, drift)
     gap = height - p.base_radius
     if gap < 0:
         normal, tangent = (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        count = add_contact(p, rows, count, gap, p.base_softness, normal, tangent, speed)
+        count = add_contact(p, rows, count, gap, p.base_softness, normal, tangent, speed, drift)
     return count
 
 
@@ -171,7 +191,7 @@ def add_stops(p: Record, rows: Array, count: int, q: Vector, speed: Vector) -> i
         if gap < 0:
             imp = impedance(gap)
             row = rows[count]
-            row[0], row[1], row[2] = 0.0, 0.0, 0.0
+            row[0], row[1], row[2], row[5] = 0.0, 0.0, 0.0, 0.0
             row[1 + joint] = sign
             rate = sign * (speed[1] if joint == 0 else speed[2])
             row[3] = -p.stop_damping * rate - p.stop_stiffness * imp * gap
@@ -181,7 +201,14 @@ def add_stops(p: Record, rows: Array, count: int, q: Vector, speed: Vector) -> i
 
 
 @inlined
-def active(a: Vector, friction: Friction, rows: Array, count: int) -> int:
+def along(row: Array, x: Four, forward: bool) -> float:
+    """Return J x of a row."""
+    value: float = row[0] * x[0] + row[1] * x[1] + row[2] * x[2]
+    return value + row[5] * x[3] if forward else value
+
+
+@inlined
+def active(a: Four, friction: Friction, rows: Array, count: int, forward: bool) -> int:
     """Return which pieces of the s_i hold at an acceleration, as bits.
 
     Two bits each say whether a dry friction slides forward or backward, one whether a row pushes.
@@ -197,13 +224,13 @@ def active(a: Vector, friction: Friction, rows: Array, count: int) -> int:
                 bits |= 2 << (2 * i)
     for c in range(count):
         row = rows[c]
-        if row[0] * a[0] + row[1] * a[1] + row[2] * a[2] < row[3]:
+        if along(row, a, forward) < row[3]:
             bits |= _FIRST_ROW << c
     return bits
 
 
 @inlined
-def friction_slope(i: int, a: Vector, friction: Friction, bits: int) -> tuple[float, float]:
+def friction_slope(i: int, a: Four, friction: Friction, bits: int) -> tuple[float, float]:
     """Return first and second derivative of a dry friction's s_i by a_i on the piece that holds."""
     loss, stiff, rest, _ = friction
     if loss[i] <= 0:
@@ -217,14 +244,14 @@ def friction_slope(i: int, a: Vector, friction: Friction, bits: int) -> tuple[fl
 
 @inlined
 def slope_along(
-    along: float, a: Vector, x: Vector, friction: Friction, rows: Array, count: int
+    t: float, a: Four, x: Four, friction: Friction, rows: Array, count: int, forward: bool
 ) -> tuple[float, float]:
-    """Return first and second derivative of all s_i along a + t x at t = ``along``."""
+    """Return first and second derivative of all s_i along a + t x."""
     loss, stiff, rest, bound = friction
     first = second = 0.0
     for i in range(3):
         if loss[i] > 0:
-            beyond = a[i] + along * x[i] - rest[i]
+            beyond = a[i] + t * x[i] - rest[i]
             if beyond > bound[i]:
                 first += loss[i] * x[i]
             elif beyond < -bound[i]:
@@ -234,8 +261,8 @@ def slope_along(
                 second += stiff[i] * x[i] * x[i]
     for c in range(count):
         row = rows[c]
-        rise = row[0] * x[0] + row[1] * x[1] + row[2] * x[2]
-        miss = row[0] * a[0] + row[1] * a[1] + row[2] * a[2] - row[3] + along * rise
+        rise = along(row, x, forward)
+        miss = along(row, a, forward) - row[3] + t * rise
         if miss < 0:
             first += row[4] * miss * rise
             second += row[4] * rise * rise
@@ -244,60 +271,91 @@ def slope_along(
 
 @inlined
 def constrained_acceleration(
-    m: Symmetric, force: Vector, friction: Friction, rows: Array, count: int, a: Vector
-) -> Vector:
-    """Return the acceleration that minimises Gauss' principle, beginning at ``a``.
+    m: Symmetric,
+    force: Vector,
+    moving: Forward,
+    friction: Friction,
+    rows: Array,
+    count: int,
+    a: Four,
+    forward: bool,
+) -> Four:
+    """Return the acceleration (x'', q1'', q2'', y'') that minimises Gauss' principle.
 
     Where the pieces at the end of a full Newton step are those at its beginning, it is the minimum.
 
     Args:
         m: Mass matrix.
         force: f - b.
+        moving: What there is of y.
         friction: The dry frictions.
-        rows: Contacts and stops (J, r, D), (``ROWS``, 5).
+        rows: Contacts and stops, (``ROWS``, ``ROW``).
         count: How many there are.
         a: Where to begin.
+        forward: Whether there is a y; its acceleration stays zero where there is none.
     """
-    bits = active(a, friction, rows, count)
+    coupling, mass, force_y = moving
+    bits = active(a, friction, rows, count, forward)
     for _ in range(_ITERATIONS):
         # Gradient g and Hessian h of the principle on the pieces that hold.
-        r0, r1, r2 = times(m, a)
+        y = a[3]
+        r0, r1, r2 = times(m, (a[0], a[1], a[2]))
+        if forward:
+            r0, r1, r2 = r0 + coupling[0] * y, r1 + coupling[1] * y, r2 + coupling[2] * y
         residual = (r0 - force[0], r1 - force[1], r2 - force[2])
         s0, d0 = friction_slope(0, a, friction, bits)
         s1, d1 = friction_slope(1, a, friction, bits)
         s2, d2 = friction_slope(2, a, friction, bits)
         g0, g1, g2 = residual[0] + s0, residual[1] + s1, residual[2] + s2
         h0, h1, h2, h3, h4, h5 = m[0] + d0, m[1], m[2], m[3] + d1, m[4], m[5] + d2
+        e0, e1, e2, e3, g3 = coupling[0], coupling[1], coupling[2], mass, 0.0
+        residual_y = 0.0
+        if forward:
+            residual_y = dot(coupling, (a[0], a[1], a[2])) + mass * y - force_y
+            g3 = residual_y
         for c in range(count):
             if bits & (_FIRST_ROW << c):
                 row = rows[c]
                 j0, j1, j2, d = row[0], row[1], row[2], row[4]
-                pull = d * (j0 * a[0] + j1 * a[1] + j2 * a[2] - row[3])
+                pull = d * (along(row, a, forward) - row[3])
                 g0, g1, g2 = g0 + j0 * pull, g1 + j1 * pull, g2 + j2 * pull
                 h0, h1, h2 = h0 + d * j0 * j0, h1 + d * j0 * j1, h2 + d * j0 * j2
                 h3, h4, h5 = h3 + d * j1 * j1, h4 + d * j1 * j2, h5 + d * j2 * j2
-        x = solve((h0, h1, h2, h3, h4, h5), (-g0, -g1, -g2))
-        after = (a[0] + x[0], a[1] + x[1], a[2] + x[2])
-        if active(after, friction, rows, count) == bits:
+                if forward:
+                    j3 = row[5]
+                    e0, e1, e2 = e0 + d * j0 * j3, e1 + d * j1 * j3, e2 + d * j2 * j3
+                    e3, g3 = e3 + d * j3 * j3, g3 + j3 * pull
+        if forward:
+            x = solve_forward((h0, h1, h2, h3, h4, h5), (e0, e1, e2), e3, (-g0, -g1, -g2), -g3)
+        else:
+            x0, x1, x2 = solve((h0, h1, h2, h3, h4, h5), (-g0, -g1, -g2))
+            x = (x0, x1, x2, 0.0)
+        after = (a[0] + x[0], a[1] + x[1], a[2] + x[2], y + x[3])
+        if active(after, friction, rows, count, forward) == bits:
             return after
         # Exact line search: Newton's method within a bracket on the slope along x.
+        step = (x[0], x[1], x[2])
         descent = abs(g0 * x[0] + g1 * x[1] + g2 * x[2])
-        linear, square = dot(residual, x), dot(x, times(m, x))
-        along, low, high = 1.0, 0.0, np.inf
+        linear, square = dot(residual, step), dot(step, times(m, step))
+        if forward:
+            descent = abs(g0 * x[0] + g1 * x[1] + g2 * x[2] + g3 * x[3])
+            linear += residual_y * x[3]
+            square += x[3] * (2 * dot(coupling, step) + mass * x[3])
+        t, low, high = 1.0, 0.0, np.inf
         for _ in range(_SEARCHES):
-            first, second = slope_along(along, a, x, friction, rows, count)
-            first, second = first + linear + along * square, second + square
+            first, second = slope_along(t, a, x, friction, rows, count, forward)
+            first, second = first + linear + t * square, second + square
             if abs(first) <= 1e-12 * descent:
                 break
             if first > 0:
-                high = along
+                high = t
             else:
-                low = along
-            along -= first / second
-            if not low < along < high:
-                along = (low + high) / 2 if high < np.inf else 2 * low
-        a = (a[0] + along * x[0], a[1] + along * x[1], a[2] + along * x[2])
-        bits = active(a, friction, rows, count)
+                low = t
+            t -= first / second
+            if not low < t < high:
+                t = (low + high) / 2 if high < np.inf else 2 * low
+        a = (a[0] + t * x[0], a[1] + t * x[1], a[2] + t * x[2], y + t * x[3])
+        bits = active(a, friction, rows, count, forward)
         if descent <= 1e-300:
             break
     return a

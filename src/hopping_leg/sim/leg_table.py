@@ -15,7 +15,9 @@ SENSORS = ("position", "velocity", "torque")
 _SCALARS = (
     # Masses and inertias, see leg_physics.mass_matrix; inertias with the rotor where it is rigid.
     "mass", "thigh_moment", "shank_moment", "coupling", "hip_inertia", "shank_inertia",
-    "knee_inertia", "gravity", "fixed_base",
+    "knee_inertia", "gravity", "weight", "fixed_base",
+    # Boom, if it has a radius: height of its pivot, and mass that moves forward.
+    "boom_radius", "boom_pivot", "forward_mass",
     # Geometry.
     "thigh_length", "shank_length", "base_radius", "knee_radius", "foot_radius",
     # Ground and stops: MuJoCo's stiffness and damping, and regularisation per 1 - impedance.
@@ -53,7 +55,6 @@ def leg_table(
     timestep: float,
     *,
     fixed_base: bool = False,
-    gravity: float = GRAVITY,
 ) -> Records:
     """Return the rows of robots for a physics step, s; (n,) of ``LEG``.
 
@@ -64,7 +65,7 @@ def leg_table(
             stiffness.
     """
     distinct = {id(robot): robot for robot in robots}  # many times the same one
-    rows = {key: _row(robot, timestep, fixed_base, gravity) for key, robot in distinct.items()}
+    rows = {key: _row(robot, timestep, fixed_base) for key, robot in distinct.items()}
     return np.array([rows[id(robot)] for robot in robots])
 
 
@@ -81,12 +82,13 @@ def leg_geometry(robots: Sequence[Robot]) -> Geometry:
     return LegGeometry(Lengths(thigh), Lengths(shank), *map(Radii, balls))
 
 
-def _row(robot: Robot, timestep: float, fixed_base: bool, gravity: float) -> Records:
+def _row(robot: Robot, timestep: float, fixed_base: bool) -> Records:
     row = np.zeros((), LEG)
     reality = robot.reality
-    row["fixed_base"], row["gravity"] = fixed_base, gravity
+    row["fixed_base"], row["gravity"] = fixed_base, GRAVITY
     row["elastic"] = [_is_elastic(robot, name) for name in JOINTS]
-    row["rail_damping"], row["rail_friction"] = robot.rail.damping, robot.rail.friction
+    guide = robot.boom if robot.boom.radius else robot.rail
+    row["rail_damping"], row["rail_friction"] = guide.damping, guide.friction
     for name in ("damping", "friction", "load_friction", "armature", "stop_lower", "stop_upper"):
         row[name] = robot.of_joints(name)
     row["stiction"] = row["friction"] * (reality.of_drives("stiction") - 1)
@@ -123,7 +125,15 @@ def _set_bodies(row: Records, robot: Robot) -> None:
     thigh, shank = robot.thigh, robot.shank
     thigh_mass, shank_mass = thigh.mass * scale.thigh, shank.mass * scale.shank
     rigid = np.where(row["elastic"] > 0, 0.0, row["armature"])
-    row["mass"] = robot.base.mass * scale.base + thigh_mass + shank_mass
+    boom = None if row["fixed_base"] or not robot.boom.radius else robot.boom
+    base = robot.base.mass - (robot.rail.slider if boom else 0.0)
+    row["mass"] = base * scale.base + thigh_mass + shank_mass
+    row["weight"] = row["gravity"] * row["mass"]
+    if boom:
+        row["forward_mass"] = row["mass"] + boom.inertia + boom.forward_mass
+        row["mass"] += boom.inertia + boom.mass
+        row["weight"] += GRAVITY * boom.moment + boom.weight
+        row["boom_radius"], row["boom_pivot"] = boom.radius, boom.pivot
     row["thigh_moment"] = thigh_mass * thigh.com + shank_mass * thigh.length
     row["shank_moment"] = shank_mass * shank.com
     row["coupling"] = row["shank_moment"] * thigh.length
@@ -179,9 +189,14 @@ def _set_softness(row: Records, robot: Robot, timestep: float) -> None:
         inverse[0, 0] = 0.0
     # Upwards the hanging shank's centre of mass moves with the base, forward with both joints.
     forward = np.array([0.0, robot.thigh.length + robot.shank.com, robot.shank.com])
-    row["base_softness"] = inverse[0, 0] / 3
+    if row["boom_radius"]:
+        tie = np.array([0.0, row["thigh_moment"] + row["shank_moment"], row["shank_moment"]])
+        whole = np.block([[mass, tie[:, None]], [tie, row["forward_mass"]]])
+        inverse = np.linalg.inv(whole)
+        forward = np.append(forward, 1.0)
+    row["base_softness"] = (inverse[0, 0] + (inverse[3, 3] if row["boom_radius"] else 0)) / 3
     row["shank_softness"] = (inverse[0, 0] + forward @ inverse @ forward) / 3
-    joints = inverse.diagonal()[1:]
+    joints = inverse.diagonal()[1:3]
     row["joint_softness"] = joints
     rotors = np.where(row["elastic"] > 0, 1 / np.maximum(row["armature"], 1e-12), joints)
     impedance = model.FRICTION_IMPEDANCE[0]

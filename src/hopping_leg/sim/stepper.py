@@ -13,6 +13,7 @@ import numpy as np
 from hopping_leg.arrays import Array, Record, Records
 from hopping_leg.sim.compiled import compiled, inlined
 from hopping_leg.sim.leg_physics import (
+    ROW,
     ROWS,
     add_contacts,
     add_stops,
@@ -20,6 +21,7 @@ from hopping_leg.sim.leg_physics import (
     mass_matrix,
     rotor_acceleration,
     solve,
+    solve_forward,
     times,
 )  # fmt: skip
 
@@ -40,7 +42,8 @@ least power of both together, W, highest speeds of the joints, rad/s, 1 if one w
 MEMORY = np.dtype(
     [
         ("rotor", np.float64, (4,)),  # angles and speeds behind elastic transmissions
-        ("acceleration", np.float64, (3,)),
+        ("acceleration", np.float64, (4,)),
+        ("forward", np.float64),  # velocity of the base on a boom
         ("motor_torque", np.float64, (2,)),
         ("mean_torque", np.float64, (2,)),
         ("loads", np.float64, (len(LOADS),)),
@@ -76,8 +79,9 @@ def copy_memory(source: Record, target: Record) -> None:
     """Copy what a leg's next steps depend on."""
     for i in range(4):
         target.rotor[i] = source.rotor[i]
-    for i in range(3):
+    for i in range(4):
         target.acceleration[i] = source.acceleration[i]
+    target.forward = source.forward
     for i in range(2):
         target.motor_torque[i] = source.motor_torque[i]
     for i in range(COMMAND):
@@ -227,8 +231,8 @@ def implicit_damping(p: Record, joint: int, relief: float, dt: float) -> tuple[f
     return tie - tie * tie * ease, tie, ease
 
 
-@compiled
-def step_leg(
+@inlined
+def advance(
     p: Record,
     state: Array,
     memory: Record,
@@ -237,22 +241,27 @@ def step_leg(
     push: float,
     steps: int,
     dt: float,
+    forward: bool,
 ) -> None:
-    """Advance one leg by physics steps.
+    """Advance one leg by physics steps, on a rail or, with ``forward``, on a boom.
 
     Args:
         p: The leg's row of the table.
         state: (x, q1, q2) of the links and their rates, (6,).
         memory: The leg's ``MEMORY``.
         past: Ring of what the sensors saw, (k, 6); empty if nothing needs it.
-        rows: Scratch for constraints, (``ROWS``, 5).
+        rows: Scratch for constraints, (``ROWS``, ``ROW``).
         push: Upward force on the base, N.
         steps: How many.
         dt: Physics step, s.
     """
     x, q1, q2, v0, v1, v2 = state[0], state[1], state[2], state[3], state[4], state[5]
     t1, t2, w1, w2 = memory.rotor[0], memory.rotor[1], memory.rotor[2], memory.rotor[3]
-    a = (memory.acceleration[0], memory.acceleration[1], memory.acceleration[2])
+    a = (memory.acceleration[0], memory.acceleration[1], memory.acceleration[2], 0.0)
+    drift, moving = 0.0, ((0.0, 0.0, 0.0), 1.0, 0.0)
+    if forward:
+        drift = memory.forward
+        a = (a[0], a[1], a[2], memory.acceleration[3])
     hip, knee = memory.motor_torque[0], memory.motor_torque[1]
     elastic1, elastic2 = p.elastic[0] > 0, p.elastic[1] > 0
     fixed = p.fixed_base > 0
@@ -287,9 +296,18 @@ def step_leg(
         bend = p.coupling * (s12 * c1 - c12 * s1)
         v12 = v1 + v2
         swing = p.thigh_moment * c1 * v1 * v1 + p.shank_moment * c12 * v12 * v12
-        force0 = push - p.gravity * m[0] - swing - p.rail_damping * v0
+        force0 = push - p.weight - swing - p.rail_damping * v0
         force1 += bend * v2 * (v1 + v12) - p.gravity * m[1]
         force2 -= bend * v1 * v1 + p.gravity * m[2]
+
+        if forward:  # the boom's arc makes it heavier away from its pivot's height
+            lean = (x - p.boom_pivot) / p.boom_radius
+            level = 1 - lean * lean
+            force0 -= p.mass * lean / (p.boom_radius * level * level) * v0 * v0
+            m = (p.mass / level, m[1], m[2], m[3], m[4], m[5])
+            fold = p.shank_moment * c12
+            swing = p.thigh_moment * s1 * v1 * v1 + p.shank_moment * s12 * v12 * v12
+            moving = ((0.0, p.thigh_moment * c1 + fold, fold), p.forward_mass, swing)
 
         # Constraints, and the acceleration under them.
         speed = (v0, v1, v2)
@@ -298,7 +316,7 @@ def step_leg(
             m = (1.0, 0.0, 0.0, m[3], m[4], m[5])
             force0 = 0.0
         else:
-            touching = add_contacts(p, rows, x, speed, s1, c1, s12, c12)
+            touching = add_contacts(p, rows, x, speed, s1, c1, s12, c12, drift)
         count = add_stops(p, rows, touching, (x, q1, q2), speed)
         if count > touching:
             stop = 1.0
@@ -306,17 +324,24 @@ def step_leg(
         loss = (rail, loss1, loss2)
         bound = (rail * soft[0], loss1 * soft[1], loss2 * soft[2])
         friction = (loss, stiff, (b * v0, b * v1, b * v2), bound)
-        a = constrained_acceleration(m, (force0, force1, force2), friction, rows, count, a)
+        force = (force0, force1, force2)
+        a = constrained_acceleration(m, force, moving, friction, rows, count, a, forward)
 
         # The new velocity, in which damping is implicit, and the position that follows it.
-        f0, f1, f2 = times(m, a)
+        f0, f1, f2 = times(m, (a[0], a[1], a[2]))
         drag1, tie1, ease1 = implicit_damping(p, 0, relief1, dt)
         drag2, tie2, ease2 = implicit_damping(p, 1, relief2, dt)
         f1 += tie1 * ease1 * armature1 * rotor1
         f2 += tie2 * ease2 * armature2 * rotor2
-        y0, y1, y2 = solve(
-            (m[0] + rail_drag, m[1], m[2], m[3] + drag1, m[4], m[5] + drag2), (f0, f1, f2)
-        )
+        damped = (m[0] + rail_drag, m[1], m[2], m[3] + drag1, m[4], m[5] + drag2)
+        if forward:
+            c, mass, _ = moving
+            f1, f2 = f1 + c[1] * a[3], f2 + c[2] * a[3]
+            pull = c[1] * a[1] + c[2] * a[2] + mass * a[3]
+            y0, y1, y2, y3 = solve_forward(damped, c, mass, (f0, f1, f2), pull)
+            drift += dt * y3
+        else:
+            y0, y1, y2 = solve(damped, (f0, f1, f2))
         v0, v1, v2 = v0 + dt * y0, v1 + dt * y1, v2 + dt * y2
         x, q1, q2 = x + dt * v0, q1 + dt * v1, q2 + dt * v2
         if elastic1:
@@ -350,13 +375,45 @@ def step_leg(
         memory.pending[k, 0] -= steps * dt
     state[0], state[1], state[2], state[3], state[4], state[5] = x, q1, q2, v0, v1, v2
     memory.rotor[0], memory.rotor[1], memory.rotor[2], memory.rotor[3] = t1, t2, w1, w2
-    memory.acceleration[0], memory.acceleration[1], memory.acceleration[2] = a
+    memory.acceleration[0], memory.acceleration[1], memory.acceleration[2] = a[0], a[1], a[2]
+    if forward:
+        memory.forward, memory.acceleration[3] = drift, a[3]
     memory.motor_torque[0], memory.motor_torque[1] = hip, knee
     memory.mean_torque[0], memory.mean_torque[1] = mean1 / steps, mean2 / steps
     loads = memory.loads
     loads[0], loads[1] = square1 / steps, square2 / steps
     loads[2], loads[3] = power1 / steps, power2 / steps
     loads[4], loads[5], loads[6], loads[7] = least, peak1, peak2, stop
+
+
+@compiled
+def step_leg(
+    p: Record,
+    state: Array,
+    memory: Record,
+    past: Array,
+    rows: Array,
+    push: float,
+    steps: int,
+    dt: float,
+) -> None:
+    """Advance one leg on its rail, see ``advance``."""
+    advance(p, state, memory, past, rows, push, steps, dt, False)
+
+
+@compiled
+def step_leg_on_boom(
+    p: Record,
+    state: Array,
+    memory: Record,
+    past: Array,
+    rows: Array,
+    push: float,
+    steps: int,
+    dt: float,
+) -> None:
+    """Advance one leg on its boom, see ``advance``."""
+    advance(p, state, memory, past, rows, push, steps, dt, True)
 
 
 @compiled
@@ -377,11 +434,14 @@ def step_legs(
 
     Commands are (n, ``COMMAND``); ``jitter`` is the share of it, [0, 1), (n,).
     """
-    rows = np.empty((ROWS, 5))
+    rows = np.empty((ROWS, ROW))
     for k in range(first, last):
         p, leg = table[k], memory[k]
         send(leg, command[k], p.command_latency + jitter[k] * p.command_jitter)
-        step_leg(p, state[k], leg, past[k], rows, push[k], steps, dt)
+        if p.boom_radius > 0:
+            step_leg_on_boom(p, state[k], leg, past[k], rows, push[k], steps, dt)
+        else:
+            step_leg(p, state[k], leg, past[k], rows, push[k], steps, dt)
 
 
 @compiled
