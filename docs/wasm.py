@@ -39,7 +39,7 @@ def _functions() -> dict[str, tuple[Any, Any]]:
     from numba import carray, types
 
     from hopping_leg.sim import stepper
-    from hopping_leg.sim.leg_physics import ROW, ROWS
+    from hopping_leg.sim.leg_physics import SCRATCH
     from hopping_leg.sim.leg_table import LEG
 
     plain = numba.njit(error_model="numpy", forceinline=True)
@@ -55,7 +55,7 @@ def _functions() -> dict[str, tuple[Any, Any]]:
         """Send a command, (``COMMAND``,), and advance the leg; ``rows`` is scratch."""
         own = carray(leg, 1)[0]
         send(own, carray(command, command_size), arrival)
-        ring, scratch = carray(past, (depth, 6)), carray(rows, (ROWS, ROW))
+        ring, scratch = carray(past, (depth, 6)), carray(rows, SCRATCH)
         step_leg(carray(p, 1)[0], carray(state, 6), own, ring, scratch, push, steps, dt)
 
     def read(p, leg, past, depth, draws, reading, dt):  # noqa: ANN001, ANN202

@@ -53,6 +53,7 @@ def add_boom(spec, boom):
     """Let the base move forward, too, and add the boom's inertias."""
     rail = spec.joint("rail")
     rail.armature, rail.damping = boom.mass, [boom.damping, 0, 0]
+    spec.body("base").mass -= boom.slider
     rail.frictionloss = boom.friction
     ahead = spec.body("base").add_joint(
         name="ahead", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1, 0, 0]
@@ -185,7 +186,7 @@ ELASTIC = {
 }
 
 
-BOOM = {"boom": Boom(1e9, 0.0, 0.8, 0.6, -4.0, 0.5, 1.0)}
+BOOM = {"boom": Boom(1e9, 0.0, 0.3, 0.8, 0.6, -4.0, 0.5, 1.0)}
 """Its arc is a straight line."""
 
 
@@ -235,7 +236,7 @@ def test_the_acceleration_obeys_gauss_principle(seed, count, sliding, boom):
     mass, (force, start) = root @ root.T, rng.normal(0, [[100.0], [1000.0]], (2, n))
     loss = np.where([sliding >> i & 1 for i in range(3)], 10 ** rng.uniform(-2, 2, 3), 0.0)
     stiff, rest = 10 ** rng.uniform(0, 3, 3), rng.normal(0, 100, 3)
-    rows = np.zeros((leg_physics.ROWS, leg_physics.ROW))
+    rows = np.zeros(leg_physics.SCRATCH)
     rows[:count] = rng.normal(0, 1, (count, 6)) * [1, 1, 1, 100, 0, boom]
     rows[:count, 4] = 10 ** rng.uniform(-1, 3, count)
     friction = tuple(map(tuple, (loss, stiff, rest, loss / stiff)))

@@ -1,5 +1,6 @@
 """Recordings of other loggers, recognised by their columns; a rig's format is a file in rigs/."""
 
+import itertools
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,10 +14,7 @@ import polars as pl
 from hopping_leg.errors import RecordingError
 from hopping_leg.identify.recording_format import PAIRS, RecordingMetadata, cast, sidecar_path
 from hopping_leg.io import parse_toml, read_dataclass
-
-BOOM_RADIUS = 1.146
-"""Base rise per sine of boom pitch, m."""
-
+from hopping_leg.robot import JOINTS, Boom, load_robot
 
 @dataclass(frozen=True)
 class LogFormat:
@@ -31,26 +29,38 @@ class LogFormat:
     """The rig's columns of which others are made, see ``_DERIVED``."""
     own_rate: bool = False
     """Whether the rate, never stated, is that of the clock to three digits, or 1 where unknown."""
+    mirrored: bool = False
+    """Whether the log's angles, velocities and torques have the other sign."""
+    before_belt: tuple[str, ...] = ()
+    """Joints whose torques were logged before the belt, which multiplies them by its ratio."""
 
 
-def _hip_velocity(table: pl.DataFrame) -> pl.Series:
+LAB_FILES = ("stateData", "encoderData")
+"""Tables of the lab's folders, row by row beside each other."""
+
+
+def _hip_velocity(table: pl.DataFrame, boom: Boom) -> pl.Series:
     """Return the hip's velocity command that its drive got.
 
     The leg swung by theta and stretched by k: q = (theta - k/2, k), with equal links. In all
     segments the hip lags behind the swing as its damping makes it without the swing's velocity
     (60 ms), but not behind the stretching, so the drive got -k/2 alone, not what the file says.
     """
+    del boom
     return (-0.5 * table["knee_vel_cmd"]).alias(PAIRS["velocity_command"][0])
 
 
-_DERIVED: dict[str, Callable[[pl.DataFrame], pl.Series]] = {
-    "t_exact": lambda table: (table["t_exact"] > 0).alias("exact_time"),
+_DERIVED: dict[str, Callable[[pl.DataFrame, Boom], pl.Series]] = {
+    "t_exact": lambda table, _: (table["t_exact"] > 0).alias("exact_time"),
     "knee_vel_cmd": _hip_velocity,
-    "boom_pitch": lambda table: (BOOM_RADIUS * table["boom_pitch"].sin()).alias("base_rise_m"),
+    "boom_pitch": lambda t, boom: (boom.radius * t["boom_pitch"].sin()).alias("base_rise_m"),
+    "pitch_pos": lambda t, boom: (boom.pivot + boom.radius * t["pitch_pos"].sin()).alias(
+        "height_m"
+    ),
 }
 
 
-RIGS = ("legv2_fixed_base", "legv1_rail", "legv2_boom", "doublependulum")
+RIGS = ("legv2_fixed_base", "legv1_rail", "legv2_boom_200hz", "legv2_boom", "doublependulum")
 """Names of the known rigs."""
 
 
@@ -92,6 +102,17 @@ def read_log(table: pl.DataFrame, path: Path) -> tuple[pl.DataFrame, RecordingMe
         rate = float(f"{1 / step:.3g}") if 0 < step < np.inf else 1.0
         metadata = replace(metadata, rate_hz=rate)
     present = [pl.col(own).alias(c) for c, own in rig.columns.items() if own in table.columns]
-    derived = [_DERIVED[own](table) for own in rig.derived if own in table.columns]
+    boom = metadata.boom
+    derived = [_DERIVED[own](table, boom) for own in rig.derived if own in table.columns]
     renamed = table.select(present).with_columns(pl.int_range(pl.len()).alias("row"))
-    return renamed.with_columns(derived), metadata
+    return _at_joints(renamed, rig).with_columns(derived), metadata
+
+
+def _at_joints(table: pl.DataFrame, rig: LogFormat) -> pl.DataFrame:
+    """Return the joints' columns with the robot's signs, and torques after the belt."""
+    signs = dict.fromkeys(itertools.chain(*PAIRS.values()), -1.0 if rig.mirrored else 1.0)
+    for joint in rig.before_belt:
+        ratio = getattr(load_robot(rig.metadata.robot), joint).belt_ratio
+        for name in ("torque", "torque_command"):
+            signs[PAIRS[name][JOINTS.index(joint)]] *= ratio
+    return table.with_columns(pl.col(c) * sign for c, sign in signs.items() if c in table.columns)

@@ -19,7 +19,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.identify import parameters, recording_format
 from hopping_leg.identify.recording import Recording
-from hopping_leg.robot import GRAVITY, Robot, dynamics, kinematics
+from hopping_leg.robot import Robot, dynamics, kinematics
 
 _REACH = 0.02  # time to either side of a row that its cubic spans, s
 _LEAST_ROWS = 5  # to either side, below which a cubic smooths nothing
@@ -159,7 +159,6 @@ class OffsetFinder:
             np.stack([np.interp(self._grid, time, column) for column in values.T], axis=1)
             for values in (position, velocity)
         )
-        self._gravity = recording.metadata.effective_gravity / GRAVITY
 
     def find(self, hypothesis: parameters.LegHypothesis) -> Array:
         """Return the offsets of hip and knee if the leg is as the hypothesis, rad, (2,)."""
@@ -194,7 +193,7 @@ class OffsetFinder:
         robot, q, qd = hypothesis.robot, self._q - offsets, self._qd
         momentum = np.einsum("nij,nj->ni", dynamics.mass_matrix(robot, q)[:, 1:, 1:], qd)
         lever = robot.shank.mass * robot.shank.com * robot.thigh.length
-        force = torque - self._gravity * dynamics.gravity_force(robot, q)[:, 1:]
+        force = torque - dynamics.gravity_force(robot, q)[:, 1:]
         force[:, 1] -= lever * np.sin(q[:, 1]) * qd[:, 0] * (qd[:, 0] + qd[:, 1])
         load = hypothesis.robot.of_joints("load_friction") * np.abs(torque)
         force -= (robot.of_joints("friction") + load) * np.tanh(qd / _DRAG)

@@ -144,15 +144,20 @@ def load_recording(path: str | Path) -> Recording:
 
 def _read(path: Path, origin: str) -> tuple[pl.DataFrame, dict[str, Any], str]:
     """Return a file's or bag's own table, its header, and the SHA-256 of its bytes."""
-    bag = path.is_dir() or path.suffix in _BAGS
+    logs = [p for name in importers.LAB_FILES for p in path.parent.glob(f"{path.name}/{name}.csv*")]
+    bag = (path.is_dir() and not logs) or path.suffix in _BAGS
     try:
-        files = bag_files(path) if bag else [path]
+        files = logs or (bag_files(path) if bag else [path])
         content = b"".join(file.read_bytes() for file in files)
     except OSError as error:
         raise RecordingError(f"Cannot read the recording {path}: {error.strerror}.") from error
     if not files:
         raise RecordingError(f"{path} is a folder without .mcap or .db3 files, no bag.")
     digest = hashlib.sha256(content).hexdigest()
+    if logs:
+        return pl.concat(
+            [_read_csv(f.read_bytes(), str(f)) for f in logs], how="horizontal"
+        ), {}, digest
     if bag:
         return *read_bag(path, origin), digest
     if content.startswith(_PARQUET):

@@ -1,7 +1,7 @@
 """What a recording holds: its columns, and the metadata that its rows do not say."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -10,7 +10,7 @@ import polars as pl
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError
-from hopping_leg.robot.model import GRAVITY
+from hopping_leg.robot import Boom
 
 PAIRS = {
     "position": ("hip_position_rad", "knee_position_rad"),
@@ -98,8 +98,8 @@ class RecordingMetadata:
     """Robot file that the recording belongs to: a shipped name or a path."""
     source: str
     """Who recorded it, where and when."""
-    effective_gravity: float = GRAVITY
-    """Acceleration of the base in free flight, m/s2; below 9.81 on a boom with a counterweight."""
+    boom: Boom = field(default_factory=Boom)
+    """The boom, where the base is on one: plain numbers in the units of a robot file."""
     sample: Sample = "before-command"
     """Whether row n holds the state before or after command n acted."""
     onboard: Onboard = "torque"
@@ -121,10 +121,13 @@ class RecordingMetadata:
     """First rows of the file whose commands were not applied; the loader leaves them out."""
 
     def __post_init__(self) -> None:
-        for name in ("rate_hz", "effective_gravity"):
-            value = getattr(self, name)
-            if not 0 < value < np.inf:
-                raise RecordingError(f"'{name}' is {value} but must be positive and finite.")
+        if not 0 < self.rate_hz < np.inf:
+            raise RecordingError(f"'rate_hz' is {self.rate_hz} but must be positive and finite.")
+        if (self.rig == "boom") != (self.boom.radius > 0):
+            raise RecordingError(
+                f"The rig is '{self.rig}' but the boom's radius is {self.boom.radius:g} m; describe"
+                " a boom, and only a boom, in [boom]."
+            )
         if self.startup_rows < 0:
             raise RecordingError(f"'startup_rows' is {self.startup_rows} but must be 0 or more.")
         for name in ("stiffness", "damping", "integral", "torque_limit"):

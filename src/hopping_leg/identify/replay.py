@@ -16,8 +16,8 @@ import numpy as np
 
 from hopping_leg.arrays import Array, Record, Records
 from hopping_leg.sim.compiled import compiled, inlined
-from hopping_leg.sim.leg_physics import ROW, ROWS
-from hopping_leg.sim.stepper import MEMORY, asked, motor_torque, step_leg
+from hopping_leg.sim.leg_physics import SCRATCH
+from hopping_leg.sim.stepper import MEMORY, asked, motor_torque, step_leg, step_leg_on_boom
 
 TORQUE, ZOH, CONTINUOUS = range(3)
 """What closes the loop: nothing, a PD once per row, the drives at every physics step."""
@@ -114,7 +114,7 @@ def _replay_window(
     memory.motor_torque[:] = 0
     memory.rotor[0], memory.rotor[1] = state[1], state[2]
     memory.rotor[2], memory.rotor[3] = state[4], state[5]
-    scratch, none = np.empty((ROWS, ROW)), np.empty((0, 6))
+    scratch, none = np.empty(SCRATCH), np.empty((0, 6))
     seen, target, integral = np.empty(4), np.zeros(2), np.zeros(2)
     zoh, delay = onboard == ZOH, drive.delay
     start, length, dt = span.start, span.length, timestep
@@ -196,7 +196,10 @@ def _replay_window(
                 many, where = 1, state.copy()
             elif moves:
                 integral += dt * (target - seen[:2])
-            step_leg(p, where, memory, none, scratch, 0.0, many, dt)
+            if p.boom_radius > 0:
+                step_leg_on_boom(p, where, memory, none, scratch, 0.0, many, dt)
+            else:
+                step_leg(p, where, memory, none, scratch, 0.0, many, dt)
             if step < 0:  # a state's speeds belong half a step before
                 for i in range(3):
                     state[3 + i] -= dt / 2 * memory.acceleration[i]

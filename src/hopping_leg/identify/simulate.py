@@ -6,7 +6,7 @@ A window begins in a measured state.
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -150,12 +150,10 @@ class _WindowGroup:
 
     def _table(self, hypotheses: Sequence[parameters.LegHypothesis]) -> Records:
         """Return the legs' rows with the software limits of drives, (hypotheses, recordings)."""
-        legs = leg_table(
-            [h.robot for h in hypotheses],
-            self._timestep,
-            fixed_base=not self._moving,
-            gravity=self._metadata.effective_gravity,
-        )
+        robots, boom = [h.robot for h in hypotheses], self._metadata.boom
+        if boom.radius:
+            robots = [replace(robot, boom=boom + robot.boom) for robot in robots]
+        legs = leg_table(robots, self._timestep, fixed_base=not self._moving)
         # Damping is implicit, the drives' own, too: half a step of it would pass for inertia.
         damping = legs["damping"].copy()
         if self._metadata.onboard == "continuous":
@@ -271,7 +269,7 @@ class WindowSimulator:
         kinds: dict[tuple[object, ...], list[int]] = {}
         for index, window in enumerate(windows):
             metadata = recordings[window.recording].metadata
-            kind = (metadata.rig, metadata.onboard, metadata.effective_gravity, metadata.zeroed)
+            kind = (metadata.rig, metadata.onboard, metadata.boom, metadata.zeroed)
             kinds.setdefault(kind, []).append(index)
         self._groups = [
             (ids, _WindowGroup(recordings, [windows[i] for i in ids], timestep, threads))

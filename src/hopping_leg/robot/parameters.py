@@ -45,8 +45,6 @@ class Rail:
     friction: float = field(metadata={"unit": "N", "zero": True})
     """Coulomb friction."""
     damping: float = field(metadata={"unit": "N s/m", "zero": True})
-    slider: float = quantity("kg", 0.0, zero=True)
-    """Mass of the slider, a part of the base's."""
 
 
 @dataclass(frozen=True)
@@ -54,14 +52,15 @@ class Boom:
     """A boom that carries the leg instead of the rail: the base moves on an arc, and forward.
 
     Its masses resist the leg at the tip by (m r^2 + I) / R^2, up and forward, and weigh g m r / R
-    there. Mass, forward mass and weight are what there is beyond them. The rail's slider stays on
-    the rail.
+    there. Mass, forward mass and weight are what there is beyond them.
     """
 
     radius: float = quantity("m", 0.0, zero=True)
     """R, from the pivot to the leg; zero where the leg is on the rail."""
     pivot: float = quantity("m", 0.0, zero=True)
     """Height of the pivot above the ground."""
+    slider: float = quantity("kg", 0.0, zero=True)
+    """What of the base's mass stays on the rail."""
     mass: float = quantity("kg", 0.0, signed=True)
     forward_mass: float = quantity("kg", 0.0, signed=True)
     weight: float = quantity("N", 0.0, signed=True)
@@ -71,6 +70,12 @@ class Boom:
     masses: tuple[tuple[float, float, float], ...] = ()
     """Of each part without the leg: mass m, kg, distance r from the pivot, m, negative for a
     counterweight, and inertia I about its centre of mass, kg m2."""
+
+    def __add__(self, other: "Boom") -> "Boom":
+        """Return this boom with what another one has beyond its masses."""
+        names = ("mass", "forward_mass", "weight", "friction", "damping")
+        more = {name: getattr(self, name) + getattr(other, name) for name in names}
+        return dataclasses.replace(self, **more)
 
     @property
     def inertia(self) -> float:
@@ -258,7 +263,7 @@ class Robot:
         if self.reality.neutral:
             del values["reality"]
         if self.boom == Boom():
-            del values["boom"], values["rail"]["slider"]
+            del values["boom"]
         for link in ("thigh", "shank"):
             del values[link]["extent"]
         for joint, name in itertools.product(JOINTS, ("load_friction", "torque_gain")):

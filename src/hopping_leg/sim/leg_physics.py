@@ -29,9 +29,11 @@ import numpy as np
 from hopping_leg.arrays import Array, Record
 from hopping_leg.sim.compiled import inlined
 
-ROWS, ROW = 11, 6
-"""Constraints at most, besides dry friction: three per contact, one per joint at its stop; numbers
-of each, (J, r, D, J_y)."""
+ROWS = 11
+"""Constraints at most, besides dry friction: three per contact, one per joint at its stop."""
+
+SCRATCH = (ROWS, 6)
+"""Shape of what holds them: (J, r, D, J_y) of each."""
 
 Vector = tuple[float, float, float]
 Four = tuple[float, float, float, float]
@@ -289,7 +291,7 @@ def constrained_acceleration(
         force: f - b.
         moving: What there is of y.
         friction: The dry frictions.
-        rows: Contacts and stops, (``ROWS``, ``ROW``).
+        rows: Contacts and stops, ``SCRATCH``.
         count: How many there are.
         a: Where to begin.
         forward: Whether there is a y; its acceleration stays zero where there is none.

@@ -126,7 +126,7 @@ def _set_bodies(row: Records, robot: Robot) -> None:
     thigh_mass, shank_mass = thigh.mass * scale.thigh, shank.mass * scale.shank
     rigid = np.where(row["elastic"] > 0, 0.0, row["armature"])
     boom = None if row["fixed_base"] or not robot.boom.radius else robot.boom
-    base = robot.base.mass - (robot.rail.slider if boom else 0.0)
+    base = robot.base.mass - (boom.slider if boom else 0.0)
     row["mass"] = base * scale.base + thigh_mass + shank_mass
     row["weight"] = row["gravity"] * row["mass"]
     if boom:

@@ -13,8 +13,7 @@ import numpy as np
 from hopping_leg.arrays import Array, Record, Records
 from hopping_leg.sim.compiled import compiled, inlined
 from hopping_leg.sim.leg_physics import (
-    ROW,
-    ROWS,
+    SCRATCH,
     add_contacts,
     add_stops,
     constrained_acceleration,
@@ -250,7 +249,7 @@ def advance(
         state: (x, q1, q2) of the links and their rates, (6,).
         memory: The leg's ``MEMORY``.
         past: Ring of what the sensors saw, (k, 6); empty if nothing needs it.
-        rows: Scratch for constraints, (``ROWS``, ``ROW``).
+        rows: Scratch for constraints, ``SCRATCH``.
         push: Upward force on the base, N.
         steps: How many.
         dt: Physics step, s.
@@ -434,7 +433,7 @@ def step_legs(
 
     Commands are (n, ``COMMAND``); ``jitter`` is the share of it, [0, 1), (n,).
     """
-    rows = np.empty((ROWS, ROW))
+    rows = np.empty(SCRATCH)
     for k in range(first, last):
         p, leg = table[k], memory[k]
         send(leg, command[k], p.command_latency + jitter[k] * p.command_jitter)

@@ -14,7 +14,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, IntArray, Record, Records
 from hopping_leg.sim.compiled import compiled, inlined
-from hopping_leg.sim.leg_physics import ROW, ROWS
+from hopping_leg.sim.leg_physics import SCRATCH
 from hopping_leg.sim.stepper import COMMAND, copy_memory, send, step_leg
 
 FLIGHT, LANDING, PUSH = 0, 1, 2
@@ -221,7 +221,7 @@ def act(
         air_steps: Physics steps per control period in the air.
         ticks: Control periods of a simulation at most.
     """
-    rows, past = np.empty((ROWS, ROW)), np.empty((0, 6))
+    rows, past = np.empty(SCRATCH), np.empty((0, 6))
     command, here, there, torque = np.zeros(COMMAND), np.empty(6), np.empty(6), np.empty(2)
     begun, plan, shape = scratch[2 * first], scratch[2 * first + 1], shapes[0]
     for k in range(first, last):
