@@ -1,13 +1,13 @@
 """Hops of the lab's legs, cut from its recordings, with the law that commanded them.
 
-On the boom the log gives the whole law: a constant force on the foot through the Jacobian's
-transpose until the leg is ``LENGTHS`` long, then a PD towards one posture. On the rail a push ends
-at one length, too, and the PD of the flight is that of the lab's script; that of the push is not
-what the motors gave, so that their measured torques stand for it.
+On the booms the log gives the whole law: a constant force on the foot through the Jacobian's
+transpose until the leg is long enough, then a PD towards one posture, all from the row before. On
+the rail the PD of the flight is that of the lab's script; that of the push is not what the motors
+gave, so that there is no law of the push.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,25 +15,39 @@ import numpy as np
 from hopping_leg.arrays import Array, BoolArray, IntArray
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.recording import Recording, load_recording
-from hopping_leg.robot import Robot, kinematics, load_robot
+from hopping_leg.robot import Boom, Robot, kinematics, load_robot
 
-RIGS = {"boom": ("legv2_boom", "*torque*"), "rail": ("legv1_rail", "*")}
-"""Folder of each rig's recordings and which of them hold torques."""
-ROBOTS = {"boom": "legv2", "rail": "legv1"}
-"""Whose lengths the controllers took."""
-FLIGHT_GAINS = 50.0, 2.0
-"""Stiffness and damping of both motors on the rail, N m/rad and N m s/rad."""
-LENGTHS = {
-    "full_run": 0.2,
-    "one_hurdle": 0.2,
-    "self_short": 0.2,
-    "es_cmd0.4m": 0.361,
-    "hopping": 0.3236,
+
+@dataclass(frozen=True)
+class Rig:
+    """How one set of recordings was made."""
+
+    folder: str
+    files: str
+    """Which of its recordings hold torques."""
+    robot: str
+    """Whose lengths the controller took, but for the shank's."""
+    shank: float
+    """m"""
+    stiffness: tuple[float, float]
+    """Of the flight's PD at the joints, N m/rad."""
+    damping: tuple[float, float]
+    """N m s/rad"""
+    limit: float = np.inf
+    """Largest push of the knee's drive behind the belt, N m: beyond it both torques shrink."""
+
+
+RIGS = {
+    "boom, 130 Hz": Rig("legv2_boom", "*torque*", "legv2", 0.14, (2.0, 4.0), (0.2, 0.4)),
+    "boom, 200 Hz": Rig("legv2_boom_200hz", "*/", "legv2", 0.15, (3.0, 6.0), (0.3, 0.6), 20.0),
+    "rail": Rig("legv1_rail", "*", "legv1", 0.2, (50.0, 50.0), (2.0, 2.0)),
 }
-"""From where on a leg flies by its law, by how a recording's name begins, m."""
+_LENGTHS = {"es_cmd0.4m": 0.361, "hopping": 0.3236}  # of the leg at lift-off on the rail, m
 _JUMP = 2.0  # rad/s, that a joint in the air does not have once its swing has ended
 _SWING = {"boom": 0.25, "rail": 0.15}  # s, after which it has
 _LATE = 5  # rows by which the boom's controller feels the ground late at most
+_GAP = 0.02  # s, that no two rows of a push may lie apart
+_SWEEP = 20  # rows over which the target of a flight's PD is looked for
 
 
 @dataclass(frozen=True)
@@ -42,6 +56,7 @@ class Hop:
 
     run: str
     rig: str
+    """Of ``RIGS``."""
     time: Array
     """Since the push-off began, s, (rows,)."""
     q: Array
@@ -61,7 +76,9 @@ class Hop:
     touchdown: int
     """Row in which the ground was felt; the last one."""
     rise: Array
-    """Of the base since the push-off began, m, (rows,); NaN on the rail."""
+    """Of the base since the push-off began, m, (rows,); NaN where none was measured."""
+    boom: Boom
+    """What carried the leg; neutral on the rail."""
 
 
 def load_hops(folder: Path, rig: str) -> list[Hop]:
@@ -75,45 +92,48 @@ def load_hops(folder: Path, rig: str) -> list[Hop]:
 
 def load_runs(folder: Path, rig: str) -> list[Recording]:
     """Return a rig's recordings that hold torques."""
-    name, pattern = RIGS[rig]
-    runs = [load_recording(path) for path in sorted((folder / name).glob(f"{pattern}.csv.gz"))]
-    if not runs:
-        raise UsageError(f"{folder} has no recordings in its folder {name}.")
-    return runs
+    files = RIGS[rig].files
+    paths = sorted(
+        (folder / RIGS[rig].folder).glob(files if files[-1] == "/" else f"{files}.csv.gz")
+    )
+    if not paths:
+        raise UsageError(f"{folder} has no recordings in its folder {RIGS[rig].folder}.")
+    return [load_recording(path) for path in paths]
 
 
 def hops_of(run: Recording, rig: str) -> Iterator[Hop]:
-    """Yield a run's hops whose touchdown was recorded."""
+    """Yield a run's hops whose touchdown was recorded, and whose push has no gap."""
     q, qd, time = run.array("position"), run.array("velocity"), run.time
+    command, torque = run.array("torque_command"), run.array("torque")
     rise = np.full(len(run), np.nan)
-    if run.has_column("base_rise_m"):
-        rise = run.trace.column("base_rise_m")
-    for start, lift_off, touchdown in _rows(run, rig):
+    for name in ("base_rise_m", "height_m"):
+        if run.has_column(name):
+            rise = run.trace.column(name)
+    for start, lift_off, touchdown in _rows(run):
+        if np.diff(time[start - 1 : lift_off + _LATE]).max() > _GAP:
+            continue
         rows = slice(start, touchdown + 1)
-        command = run.array("torque_command")[rows]
-        target = run.array("position_command")[lift_off]
-        if rig == "boom":  # tau = 2 (q* - q) - 0.2 qd of the row before
-            later = np.arange(lift_off + 2, lift_off + 22)
-            target = np.median(
-                (run.array("torque_command")[later] + 0.2 * qd[later - 1]) / 2 + q[later - 1],
-                axis=0,
-            )
+        target, length = run.array("position_command")[lift_off], 0.0
+        if run.metadata.rig == "boom":  # tau = Kp (q* - q) - Kd qd of the row before
+            stiffness, damping = np.array(RIGS[rig].stiffness), np.array(RIGS[rig].damping)
+            later = np.arange(lift_off + 2, lift_off + 2 + _SWEEP)
+            wanted = (command[later] + damping * qd[later - 1]) / stiffness + q[later - 1]
+            target = np.median(wanted, axis=0)
             if (np.abs(target) > np.pi).any():  # a somersault
                 continue
+            length = 0.2 if rig == "boom, 130 Hz" else 0.19
+        else:
+            length = next(value for name, value in _LENGTHS.items() if run.name.startswith(name))
         yield Hop(
-            run.name, rig, time[rows] - time[start], q[rows], qd[rows], run.array("torque")[rows],
-            command, target, _length(run), lift_off - start, touchdown - start,
-            rise[rows] - rise[start],
+            run.name, rig, time[rows] - time[start], q[rows], qd[rows], torque[rows],
+            command[rows], target, length, lift_off - start, touchdown - start,
+            rise[rows] - rise[start], run.metadata.boom,
         )  # fmt: skip
 
 
-def _length(run: Recording) -> float:
-    return next(value for name, value in LENGTHS.items() if run.name.startswith(name))
-
-
-def _rows(run: Recording, rig: str) -> Iterator[tuple[int, int, int]]:
+def _rows(run: Recording) -> Iterator[tuple[int, int, int]]:
     """Yield the rows at which pushes begin, flights begin and the ground is felt."""
-    if rig == "boom":
+    if run.metadata.rig == "boom":
         phase = run.trace.table["phase"].fill_null("").to_numpy()
         pushes, flights = phase == "EXERTION", phase == "FLIGHT"
     else:
@@ -124,7 +144,7 @@ def _rows(run: Recording, rig: str) -> Iterator[tuple[int, int, int]]:
     ends = np.append(_begins(~flights), len(run)) + _LATE
     for start in _begins(pushes):
         (lift_off,) = _begins(flights)[_begins(flights) > start][:1]
-        swung = run.time > run.time[lift_off] + _SWING[rig]
+        swung = run.time > run.time[lift_off] + _SWING[run.metadata.rig]
         felt = np.flatnonzero((speed > _JUMP) & swung)
         if len(felt) and felt[0] < ends[ends > lift_off][0]:
             yield int(start), int(lift_off), int(felt[0])
@@ -142,4 +162,5 @@ def force_of(robot: Robot, q: Array, torque: Array) -> Array:
 
 def controllers_robot(rig: str) -> Robot:
     """Return the robot whose lengths a rig's controller took."""
-    return load_robot(ROBOTS[rig])
+    robot = load_robot(RIGS[rig].robot)
+    return replace(robot, shank=replace(robot.shank, length=RIGS[rig].shank, extent=0.2))

@@ -1,14 +1,14 @@
-"""Recorded hops beside the same hops simulated, robot by robot, and what would bring them together.
+"""Recorded hops beside the same hops simulated, robot by robot.
 
-Two numbers of each rig are unknown: how much torque the motors really gave, and what the boom adds
-to the inertia, or the rail to the friction. They are searched on a grid; each run is judged with
-what fits the other runs best.
+The identified leg is judged on a run with what all other recordings tell (``LEFT_OUT``); on a run
+that the fit has never had, with the shipped robot. The interval of a predicted apex is made of the
+fits that leave one recording out each and of the errors of the other runs' hops.
 """
 
+import json
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from itertools import product
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,41 +17,51 @@ from matplotlib.figure import Figure
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
+from hopping_leg.evaluate import statistics
 from hopping_leg.figures import COLOURS, WIDTH, styled, to_svg
-from hopping_leg.io import write_atomically
-from hopping_leg.robot import GRAVITY, Robot, load_robot
+from hopping_leg.io import replace_at, write_atomically
+from hopping_leg.robot import Robot, load_robot
 from studies.real_hops.recorded import RIGS, Hop, load_hops
-from studies.real_hops.simulated import Simulated, simulate
-from studies.shared import show_rows
+from studies.real_hops.simulated import Simulated, fall_apex, simulate
+from studies.shared import ROOT, show_rows
 
-MEASURED_GAIN = {"boom": 0.91, "rail": 1.0}
-"""Measured torque over what ``simulate`` takes for the motors'."""
-NAMES = {"boom": ("legv2", "legv2-identified"), "rail": ("legv1",)}
-"""Robots."""
-GAINS = {"boom": np.arange(0.9, 1.61, 0.1), "rail": np.arange(0.7, 1.31, 0.1)}
-EXTRAS = {"boom": (0.0, 0.4), "rail": (0.0, 4.0, 8.0)}
-"""Mass that the boom adds, kg, and friction of the rail, N."""
+LEFT_OUT = ROOT / "studies/identification/results/real_leg.json"
+"""What ``python -m studies.identification.real_leg`` found without each recording."""
+IDENTIFIED = "legv2-identified"
+ROBOTS = {"legv2": "CAD", "legv2-paper": "Table I", IDENTIFIED: "identified", "legv1": "CAD"}
+"""What each robot is; ``legv1`` is the rail's."""
+DRIVES = {"measured": "torques as measured", "law": "the logged law"}
+PAPER_MM = "40 to 60"
+"""Mean error of the paper's policy on the real leg, mm."""
 _VARIABLE = "HOPPING_LEG_RECORDINGS"
-_WEIGHTS = {"push": 0.01, "flight": 0.03, "apex": 0.02}
-"""Errors that count alike, s, s and m."""
-_NEVER = 1e4  # of a hop that does not leave the ground
+_SETTLED = 0.04  # s after lift-off from which on the base flies freely
+_LEAST_RUNS = 3
 
 
 def errors(hop: Hop, found: Simulated) -> dict[str, float]:
-    """Return simulated less recorded: duration of push and flight, s, and apex, m.
+    """Return simulated less recorded: push and flight, s, lift-off speed, m/s, and apex, m.
 
-    Without the base's rise on the boom nobody knows how high the ground was where it landed; on the
-    rail, where it is level, the apex is that of a parabola as long as the flight.
+    The speed is that of the parabola from 40 ms after lift-off on. On the rail nobody measured a
+    height: there the apex is that of a parabola as long as the flight.
     """
-    flight = float(hop.time[hop.touchdown] - hop.time[hop.lift_off])
+    lift, flight = float(hop.time[hop.lift_off]), float(hop.time[-1] - hop.time[hop.lift_off])
     flown = found.touchdown_s - found.lift_off_s
+    error = {"push": found.lift_off_s - lift, "flight": flown - flight, "speed": np.nan}
+    if not hop.boom.radius:
+        return error | {"apex": fall_apex(flown) - fall_apex(flight)}
+    if not np.isfinite(hop.rise).all():
+        return error | {"flight": np.nan, "apex": np.nan}
+    speeds = [_speed(*course, lift) for course in ((found.time, found.rise), (hop.time, hop.rise))]
     apex = float(found.rise.max() - hop.rise.max())
-    if hop.rig == "rail":
-        apex = GRAVITY / 8 * (flown**2 - flight**2)
-    elif not np.isfinite(hop.rise[-1]):
-        flight = np.nan
-    push = found.lift_off_s - float(hop.time[hop.lift_off])
-    return {"push": push, "flight": flown - flight, "apex": apex}
+    return error | {"speed": speeds[0] - speeds[1], "apex": apex}
+
+
+def _speed(time: Array, rise: Array, lift: float) -> float:
+    """Return the base's speed when it has left the ground, m/s."""
+    rows = (time >= lift + _SETTLED) & (time <= time[int(np.argmax(rise))] + _SETTLED)
+    if np.count_nonzero(rows) < 4:
+        return float("nan")
+    return float(np.polyval(np.polyder(np.polyfit(time[rows], rise[rows], 2)), lift + _SETTLED))
 
 
 def torque_errors(hop: Hop, found: Simulated) -> Array:
@@ -62,119 +72,130 @@ def torque_errors(hop: Hop, found: Simulated) -> Array:
     return np.asarray(np.sqrt(np.mean(missed**2, axis=0)))
 
 
-def changed(robot: Robot, rig: str, extra: float) -> tuple[Robot, float]:
-    """Return the robot with the rail's friction, and the mass that the boom adds."""
-    if rig == "boom":
-        return robot, extra
-    return replace(robot, rail=replace(robot.rail, friction=extra)), 0.0
+def left_out(file: Path = LEFT_OUT) -> Mapping[str, Mapping[str, float]]:
+    """Return the identified numbers, by path, of the fits without each recording."""
+    if not file.is_file():
+        return {}
+    rows = json.loads(file.read_text(encoding="utf-8"))["without"]
+    return {row["recording"]: row["values"] for row in rows}
 
 
-def _cost(error: dict[str, float]) -> float:
-    """Return what counts of the errors; a hop without lift-off or touchdown counts most."""
-    counts = [np.nan_to_num(error[k] / size, nan=0.0) for k, size in _WEIGHTS.items()]
-    return float(np.sum(np.square(counts))) + (_NEVER if np.isnan(error["push"]) else 0.0)
+def _with(robot: Robot, values: Mapping[str, float]) -> Robot:
+    for path, value in values.items():
+        robot = replace_at(robot, path, value)
+    return robot
 
 
 def compare(folder: Path, report: Callable[[str], None]) -> tuple[dict[str, Any], list[Any]]:
     """Return every number, and of one hop per rig what a figure shows."""
-    rows, hops_of, shown = [], {}, []
-    for rig in RIGS:
+    rows, counts, shown = [], {}, []
+    others = left_out()
+    for rig, how in RIGS.items():
         hops = load_hops(folder, rig)
-        hops_of[rig] = len(hops)
-        lines = []
-        for name in NAMES[rig]:
-            report(f"{rig}: {name}")
+        counts[rig], drawn = len(hops), []
+        names = [name for name in ROBOTS if name.startswith(how.robot)]
+        for name in names:
             robot = load_robot(name)
-            first = EXTRAS[rig][0]
-            plain = [_simulate(hop, robot, rig, MEASURED_GAIN[rig], first) for hop in hops]
-            rows.append(_row(rig, f"{name}, torques as measured", hops, plain))
-            if rig == "boom":
-                asked = [_simulate(hop, robot, rig, 1.0, first) for hop in hops]
-                rows.append(_row(rig, f"{name}, torques as commanded", hops, asked))
-            fitted, chosen = _fitted(hops, robot, rig)
-            gain, extra = np.mean(chosen, axis=0)
-            rows.append(
-                _row(rig, f"{name}, fitted to the other runs", hops, fitted)
-                | {"torque_gain": float(gain), "extra": float(extra)}
-            )
-            lines += [(f"{name}, as measured", plain), (f"{name}, fitted", fitted)]
-        shown.append((rig, hops[1], [(label, found[1]) for label, found in lines]))
-    return {"rows": rows, "hops": hops_of}, shown
+            legs = [_with(robot, others.get(h.run, {}) if name == IDENTIFIED else {}) for h in hops]
+            for drive in DRIVES if how.robot == "legv2" else ("measured",):
+                report(f"{rig}: {name}, {DRIVES[drive]}")
+                by_law = drive == "law"
+                found = simulate(hops, legs, by_law=by_law)
+                row = {"rig": rig, "robot": name, "model": ROBOTS[name], "drive": DRIVES[drive]}
+                row |= _row(hops, found)
+                if name == IDENTIFIED:
+                    spread = [
+                        simulate(hops, [_with(robot, values)] * len(hops), by_law=by_law)
+                        for values in others.values()
+                    ]
+                    row |= _coverage(hops, found, spread)
+                rows.append(row)
+                drawn.append((f"{ROBOTS[name]}, {DRIVES[drive]}", found))
+        shown.append((rig, hops, drawn))
+    return {"rows": rows, "hops": counts, "paper_error_mm": PAPER_MM}, shown
 
 
-def _simulate(hop: Hop, robot: Robot, rig: str, gain: float, extra: float) -> Simulated:
-    leg, added = changed(robot, rig, extra)
-    return simulate(hop, leg, gain, added)
-
-
-def _fitted(
-    hops: Sequence[Hop], robot: Robot, rig: str
-) -> tuple[list[Simulated], list[tuple[float, float]]]:
-    """Return each hop with the gain and extra that suit the other runs' hops best, and these."""
-    grid = list(product(GAINS[rig].tolist(), EXTRAS[rig]))
-    tried = [[_simulate(hop, robot, rig, *point) for hop in hops] for point in grid]
-    costs = np.array(
-        [[_cost(errors(h, s)) for h, s in zip(hops, one, strict=True)] for one in tried]
-    )
-    runs = np.array([hop.run for hop in hops])
-    best = [int(costs[:, runs != run].sum(axis=1).argmin()) for run in runs]
-    return [tried[b][n] for n, b in enumerate(best)], [grid[b] for b in best]
-
-
-def _row(rig: str, robot: str, hops: Sequence[Hop], found: Sequence[Simulated]) -> dict[str, Any]:
-    """Return means and rms of the errors over hops, as far as something was recorded of them."""
+def _row(hops: Sequence[Hop], found: Sequence[Simulated]) -> dict[str, Any]:
+    """Return means and rms of the errors with intervals over runs, hops that failed among them."""
     each = [errors(hop, one) for hop, one in zip(hops, found, strict=True)]
     torques = [torque_errors(hop, one) for hop, one in zip(hops, found, strict=True)]
-    row: dict[str, Any] = {"rig": rig, "robot": robot, "hops": len(hops)}
-    for name, unit in (("push", "s"), ("flight", "s"), ("apex", "m")):
-        values = np.array([one[name] for one in each])
-        values = values[np.isfinite(values)]
-        known = bool(len(values))
-        row[f"{name}_mean_{unit}"] = float(values.mean()) if known else None
-        row[f"{name}_rms_{unit}"] = float(np.sqrt(np.mean(values**2))) if known else None
-    row["not_landed"] = int(np.sum([np.isnan(one["flight"]) for one in each]))
+    row: dict[str, Any] = {"hops": len(hops)}
+    runs = [hop.run for hop in hops]
+    for name, unit in (("push", "s"), ("flight", "s"), ("speed", "m_s"), ("apex", "m")):
+        by_run = [
+            [e[name] for e, r in zip(each, runs, strict=True) if r == run] for run in set(runs)
+        ]
+        known = [np.array(v)[np.isfinite(v)] for v in by_run if np.isfinite(v).any()]
+        for how, statistic in (("mean", _mean), ("rms", _rms)):
+            value, low, high = float("nan"), float("nan"), float("nan")
+            if known:
+                value = statistic(known)
+                low, high = statistics.bootstrap(known, statistic, 0, _LEAST_RUNS)
+            row |= {f"{name}_{how}_{unit}": value, f"{name}_{how}_{unit}_interval": [low, high]}
+    row["not_landed"] = int(np.sum([np.isnan(one.touchdown_s) for one in found]))
     row["torque_rms_nm"] = np.sqrt(np.mean(np.square(torques), axis=0)).tolist()
-    row["recorded_torque_rms_nm"] = np.sqrt(
-        np.mean([np.mean(hop.torque**2, axis=0) for hop in hops], axis=0)
-    ).tolist()
-    return {**row, "torque_gain": None, "extra": None}
+    return row
+
+
+def _mean(runs: Sequence[Array]) -> float:
+    return float(np.mean(np.concatenate(list(runs))))
+
+
+def _rms(runs: Sequence[Array]) -> float:
+    return float(np.sqrt(np.mean(np.square(np.concatenate(list(runs))))))
+
+
+def _coverage(
+    hops: Sequence[Hop], found: Sequence[Simulated], spread: Sequence[Sequence[Simulated]]
+) -> dict[str, Any]:
+    """Return the share of apexes within their predicted 90 % intervals, and the mean half width.
+
+    An interval is that of all fits' predictions, each with the errors of hops of other runs.
+    """
+    error = np.array([errors(h, s)["apex"] for h, s in zip(hops, found, strict=True)])
+    runs = np.array([hop.run for hop in hops])
+    inside, halves = [], []
+    for k in np.flatnonzero(np.isfinite(error)):
+        scatter = error[(runs != runs[k]) & np.isfinite(error)]
+        centres = [one[k].rise.max() for one in spread] or [found[k].rise.max()]
+        possible = np.subtract.outer(centres, scatter).ravel()
+        low, high = np.quantile(possible, (0.05, 0.95))
+        inside.append(low <= hops[k].rise.max() <= high)
+        halves.append((high - low) / 2)
+    return {"inside_90": float(np.mean(inside)), "half_width_m": float(np.mean(halves))}
 
 
 @styled
 def figure(shown: Sequence[Any]) -> Figure:
-    """Draw of one hop per rig the base's rise or the leg's angles, and the knee's torque."""
-    drawn = Figure(figsize=(WIDTH, 4.6), layout="constrained")
-    axes = drawn.subplots(2, len(shown), squeeze=False)
-    for column, (rig, hop, found) in enumerate(shown):
-        upper, lower = axes[0][column], axes[1][column]
-        recorded = hop.rise if rig == "boom" else hop.q[:, 1]
-        upper.plot(hop.time, recorded, color="0.2", label="recorded")
-        lower.plot(hop.time, hop.torque[:, 1], color="0.2")
-        for number, (label, one) in enumerate(found):
-            values = one.rise if rig == "boom" else one.q[:, 1]
-            style = {
-                "color": COLOURS[number // 2 % len(COLOURS)],
-                "linestyle": ("--", "-")[number % 2],
-                "lw": 1,
-            }
-            upper.plot(one.time, values, label=label, **style)
-            lower.plot(one.time, one.torque[:, 1], **style)
-        upper.set_title(f"{rig}, {hop.run.split('.')[0]}")
-        upper.set_ylabel("base's rise, m" if rig == "boom" else "knee, rad")
-        lower.set_ylabel("knee, N m")
-        lower.set_xlabel("time since the push began, s")
-        upper.legend(fontsize=6)
+    """Draw simulated over recorded apexes on the booms: as measured torques push, and by the law."""
+    drawn = Figure(figsize=(WIDTH, 3.6), layout="constrained")
+    booms = [(rig, hops, found) for rig, hops, found in shown if hops[0].boom.radius]
+    axes = drawn.subplots(1, len(DRIVES), sharey=True)
+    for ax, drive in zip(axes, DRIVES.values(), strict=True):
+        for marker, (rig, hops, found) in zip("os", booms, strict=True):
+            real = np.array([hop.rise.max() for hop in hops])
+            pairs = [(label.split(",")[0], one) for label, one in found if label.endswith(drive)]
+            for colour, (label, one) in zip(COLOURS[1::-1], (pairs[0], pairs[-1]), strict=True):
+                rise = [s.rise.max() for s in one]
+                ax.plot(1e3 * real, 1e3 * np.array(rise), marker, ms=4, mfc="none", color=colour,
+                        label=f"{label}, {rig}")  # fmt: skip
+        ends = [100, 500]
+        ax.plot(ends, ends, color="0.5", lw=1)
+        ax.set_title(drive)
+        ax.set_xlabel("recorded apex above the push, mm")
+    axes[0].set_ylabel("simulated, mm")
+    axes[0].legend(fontsize=7)
     return drawn
 
 
 @dataclass(frozen=True)
 class RealHops:
-    """Hop in simulation as the lab's legs hopped on boom and rail, and set both side by side."""
+    """Hop in simulation as the lab's legs hopped on booms and rail, and set both side by side."""
 
     recordings: Path | None = None
     """Folder with real recordings; default: the environment's HOPPING_LEG_RECORDINGS."""
     figure: Path | None = None
-    """SVG file for a hop of each rig."""
+    """SVG file for simulated over recorded apexes."""
     json: Path | None = None
     """Write every number to this file."""
 
@@ -184,8 +205,8 @@ class RealHops:
         if not folder:
             raise UsageError(f"Name the folder of recordings with --recordings, or in {_VARIABLE}.")
         result, shown = compare(Path(folder), print)
-        columns = ("apex_mean_m", "apex_rms_m", "push_mean_s", "flight_mean_s")
-        show_rows(result["rows"], "rig", "robot", *columns)
+        columns = ("apex_mean_m", "apex_rms_m", "speed_mean_m_s", "push_mean_s", "flight_mean_s")
+        show_rows(result["rows"], "rig", "robot", "drive", *columns)
         if self.figure is not None:
             write_atomically(self.figure, to_svg(figure(shown)))
         return result

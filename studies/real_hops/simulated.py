@@ -1,211 +1,174 @@
-"""Recorded hops made again in MuJoCo, in closed loop, by the law that commanded them.
+"""Recorded hops made again in the project's stepper, many at once.
 
-A simulation begins in the state in which a push was recorded to begin, and meets lift-off and
-touchdown when it does. On the boom the base may move forward, too; what the boom adds to its
-inertia weighs nothing, and the leg's weight is what is left by the counterweight.
+A simulation begins in the state in which a push was recorded to begin, its foot still, and meets
+lift-off and touchdown when it does. The push gives the torques that were measured, or those of the
+logged law in closed loop; the flight is the logged PD in closed loop.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
-import mujoco
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.robot import GRAVITY, MotorLimit, Robot, compile_spec, get_spec, kinematics
-from studies.real_hops.recorded import (
-    FLIGHT_GAINS,
-    Hop,
-    controllers_robot,
-    force_of,
-)
+from hopping_leg.io import replace_at
+from hopping_leg.robot import GRAVITY, JOINTS, Robot, kinematics
+from hopping_leg.sim import LegSimulator
+from studies.real_hops.recorded import RIGS, Hop, controllers_robot, force_of
 
-TIMESTEP = 1e-3
-"""Longest physics step, s; motors are asked every second one."""
-_EFFECTIVE_GRAVITY = 4.5
-"""Of the boom in free flight, m/s2."""
-_BOOM_PERIOD, _RAIL_PERIOD = 1 / 130, 1 / 630
-_BOOM_STIFFNESS, _BOOM_DAMPING = 2.0, 0.2
-_LONGEST = 1.5  # s
+TIMESTEP = 2.5e-4
+"""Physics step, s."""
+_TICK = 1e-3  # s, after which torques are asked anew
+_LONGEST = 1.2  # s
+_AFTER = 0.03  # s after lift-off from which on the flight's law holds: drives reverse slowly
+_STRONG = {"torque_limit": 100.0, "peak_torque": 100.0, "no_load_speed": 1e4}
 
 
 @dataclass(frozen=True)
 class Simulated:
-    """What came out, from the beginning of the push to the touchdown."""
+    """What came out of a hop."""
 
     time: Array
-    """s, (ticks,)"""
+    """Since the push began, s, (ticks,)."""
     q: Array
-    """rad, (ticks, 2)"""
+    """What the encoders show, rad, (ticks, 2)."""
     torque: Array
     """N m, (ticks, 2)"""
     rise: Array
     """Of the base, m, (ticks,)."""
+    speed: Array
+    """Of the base, m/s, (ticks,)."""
     lift_off_s: float
-    """When the flight's law begins."""
+    """When the flight's law begins; NaN if it never does."""
     touchdown_s: float
-    """NaN if there is none."""
+    """When the foot comes down to where it was recorded to; NaN if it does not."""
 
 
-class Leg:
-    """A robot on a rig with motors that give torques at the joints."""
-
-    def __init__(self, robot: Robot, rig: str, added_mass: float, timestep: float) -> None:
-        spec = get_spec(robot, timestep)
-        base = spec.body("base")
-        base.mass += added_mass
-        if rig == "boom":
-            base.add_joint(name="forward", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1, 0, 0])
-        for actuator in spec.actuators:
-            actuator.ctrllimited, actuator.gear[0] = False, 1
-        self.robot, self.model = robot, compile_spec(spec, robot.name)
-        self.data = mujoco.MjData(self.model)
-        names = ("rail", "hip", "knee")
-        self.rail, *joints = (int(self.model.joint(name).dofadr[0]) for name in names)
-        self._joints, self._limit = np.array(joints), MotorLimit(robot)
-        if rig == "boom":
-            lift = (robot.mass + added_mass) * (GRAVITY - _EFFECTIVE_GRAVITY)
-            self.data.qfrc_applied[self.rail] = lift
-        self._floor = self.model.geom("floor").id
-
-    @property
-    def q(self) -> Array:
-        """Joint angles, rad, (2,)."""
-        return np.array(self.data.qpos[self._joints])
-
-    @property
-    def qd(self) -> Array:
-        """Joint velocities, rad/s, (2,)."""
-        return np.array(self.data.qvel[self._joints])
-
-    @property
-    def height(self) -> float:
-        """Of the base, m."""
-        return float(self.data.qpos[self.rail])
-
-    @property
-    def touches(self) -> bool:
-        """Whether anything touches the ground."""
-        return bool(self.data.ncon)
-
-    def place(self, q: Array, qd: Array) -> None:
-        """Stand on the ground in a posture, its foot still."""
-        self.data.qpos[self._joints], self.data.qvel[self._joints] = q, qd
-        self.data.qpos[self.rail] = kinematics.stance_height(self.robot, q)
-        down, forward = kinematics.foot_velocity(self.robot, q, qd)
-        self.data.qvel[self.rail] = down
-        if self.model.nv > 3:
-            self.data.qvel[self.model.joint("forward").dofadr[0]] = -forward
-
-    def raise_ground(self, rise: float) -> None:
-        """Let the leg land so much higher than it took off, m."""
-        self.model.geom_pos[self._floor, 2] = rise
-
-    def step(self, torque: Array, steps: int) -> Array:
-        """Ask the motors for torques for physics steps; return what they gave, N m, (2,)."""
-        self.data.ctrl[:] = self._limit.give(torque, self.qd)
-        mujoco.mj_step(self.model, self.data, steps)
-        return np.array(self.data.ctrl)
+def mounted(robot: Robot, hop: Hop, *, strong: bool) -> Robot:
+    """Return a robot on what carried it, with motors that give all that is asked if ``strong``."""
+    robot = replace(robot, boom=hop.boom + robot.boom)
+    for joint in JOINTS if strong else ():
+        for name, value in _STRONG.items():
+            robot = replace_at(robot, f"{joint}.motor.{name}", value)
+        robot = replace_at(robot, f"{joint}.torque_gain", 1.0)
+    return robot
 
 
-def simulate(hop: Hop, robot: Robot, gain: float = 1.0, added_mass: float = 0.0) -> Simulated:
-    """Make a hop again with a robot.
-
-    Args:
-        hop: What was recorded.
-        robot: Leg and ground.
-        gain: Torque that the motors give over what is commanded on the boom, measured on the rail.
-        added_mass: What the boom adds to the inertia of the base, kg.
-    """
-    law = (_Boom if hop.rig == "boom" else _Rail)(hop)
-    steps = 2 * int(np.ceil(law.period / TIMESTEP / 2))
-    leg = Leg(robot, hop.rig, added_mass, law.period / steps)
-    leg.place(hop.q[0], hop.qd[0])
-    start = leg.height
-    ticks, lift_off, touchdown = [], np.nan, np.nan
-    landing = _landing(hop, robot)
-    for tick in range(round(_LONGEST / law.period)):
-        now = tick * law.period
-        law.sense(leg.q, leg.qd, now)
-        if law.flying and np.isnan(lift_off):
-            lift_off = now
-        ticks.append((now, *leg.q, *np.zeros(2), leg.height - start))
-        for _ in range(0, steps, 2):
-            given = leg.step(gain * law.torque(leg.q, leg.qd), 2)
-        ticks[-1] = (*ticks[-1][:3], *given, ticks[-1][-1])
-        falling = leg.data.qvel[leg.rail] < 0
-        if law.flying and falling and not leg.touches:
-            leg.raise_ground(landing)
-        if law.flying and falling and leg.touches and now - lift_off > 2 * law.period:
-            touchdown = now + law.period
-            break
-    rows = np.array(ticks)
-    return Simulated(rows[:, 0], rows[:, 1:3], rows[:, 3:5], rows[:, 5], lift_off, touchdown)
-
-
-def _landing(hop: Hop, robot: Robot) -> float:
-    """Return how much higher than the start the ground is where a hop ended, m."""
-    if not np.isfinite(hop.rise[-1]):
-        return 0.0
-    first, last = kinematics.stance_height(robot, hop.q[[0, -2]])
-    return float(hop.rise[-2] - (last - first))
+def simulate(
+    hops: Sequence[Hop], robots: Sequence[Robot], *, by_law: bool = False
+) -> list[Simulated]:
+    """Make hops again, each with its robot, pushed by measured torques or by the logged law."""
+    legs_of = [mounted(r, h, strong=not by_law) for r, h in zip(robots, hops, strict=True)]
+    legs = LegSimulator(legs_of[0], len(hops), rate=1 / _TICK, timestep=TIMESTEP, robots=legs_of)
+    q0 = np.array([hop.q[0] for hop in hops])
+    standing = np.array([np.median(hop.torque[:2], axis=0) for hop in hops])
+    _place(legs, hops, q0, standing)
+    pushes = [(_Law if by_law and hop.boom.radius else _Measured)(hop) for hop in hops]
+    start, landing = legs.height.copy(), _landings(hops)
+    ticks = round(_LONGEST / _TICK)
+    q, torque = np.zeros((2, ticks, len(hops), 2))
+    rise, speed = np.zeros((2, ticks, len(hops)))
+    clear, lowered = np.zeros((ticks, len(hops))), np.zeros(len(hops))
+    for tick in range(ticks):
+        q[tick], qd = legs.measured_q, legs.measured_qd
+        aloft = legs.foot_clearance() > np.maximum(landing, 0.0)
+        falls = [push.flying_s < tick * _TICK - _AFTER for push in pushes]
+        descends = aloft & falls & (legs.height_rate < 0) & (lowered == 0)
+        legs.raise_ground(np.where(descends, landing, 0.0))
+        lowered = np.where(descends, landing, lowered)
+        rise[tick], speed[tick] = legs.height + lowered - start, legs.height_rate
+        clear[tick] = legs.foot_clearance() - (landing - lowered)
+        asked = [p.torque(tick * _TICK, *s) for p, s in zip(pushes, zip(q[tick], qd), strict=True)]
+        torque[tick] = legs.step(np.array(asked))
+    time = np.arange(ticks) * _TICK
+    found = []
+    for k, push in enumerate(pushes):
+        falling = (time > push.flying_s + _AFTER) & (speed[:, k] < 0) & (clear[:, k] <= 0)
+        end = int(np.argmax(falling)) if falling.any() else ticks - 1
+        rows = slice(0, end + 1)
+        touchdown = float(time[end]) if falling.any() else np.nan
+        course = (q[rows, k], torque[rows, k], rise[rows, k], speed[rows, k])
+        found.append(Simulated(time[rows], *course, push.flying_s, touchdown))
+    return found
 
 
-class _Boom:
-    """Commands are from the sample before, and held."""
+def _place(legs: LegSimulator, hops: Sequence[Hop], q0: Array, standing: Array) -> None:
+    """Let legs stand with their feet still, belts stretched by what the standing leg's motors gave."""
+    stiffness = np.array([robot.reality.of_drives("stiffness") for robot in legs.robots])
+    link = q0 - np.nan_to_num(standing / stiffness)
+    legs.place(slice(None), 0.0, link)
+    legs.height[:] = kinematics.stance_height(legs.geometry, link) - 1e-9
+    legs.qd[:] = [hop.qd[0] for hop in hops]
+    down, forward = kinematics.foot_velocity(legs.geometry, link, legs.qd).T
+    legs.height_rate[:] = down
+    legs.forget(slice(None))
+    legs.records["rotor"][:, :2], legs.records["forward"] = q0, -forward
+    legs.read_sensors()
 
-    period = _BOOM_PERIOD
+
+def _landings(hops: Sequence[Hop]) -> Array:
+    """Return how much higher the ground is where hops ended than where they began, m."""
+    rises = [
+        (h.rise[-2], kinematics.stance_height(controllers_robot(h.rig), h.q[[0, -2]])) for h in hops
+    ]
+    return np.array([0.0 if np.isnan(up) else up - (s[1] - s[0]) for up, s in rises])
+
+
+class _Measured:
+    """The push gives what was measured, a row late, as it answers; then comes the flight's PD."""
 
     def __init__(self, hop: Hop) -> None:
-        self._robot, self._hop = controllers_robot("boom"), hop
-        self._force = force_of(self._robot, hop.q[0], hop.command[1])
-        self._old = (hop.q[0], hop.qd[0], False)
-        self._asked = np.zeros(2)
-        self.flying = False
+        self._hop, self._rig = hop, RIGS[hop.rig]
+        self.flying_s = float(hop.time[hop.lift_off])
+        self._row = 0
+        still = np.zeros(2)
+        self._newest, self._old = (hop.q[0], still), (hop.q[0], still)
 
-    def sense(self, q: Array, qd: Array, now: float) -> None:
-        """Take a sample, and command by the one before."""
-        del now
-        old_q, old_qd, flying = self._old
-        if flying:
-            self._asked = _BOOM_STIFFNESS * (self._hop.target - old_q) - _BOOM_DAMPING * old_qd
-        else:
-            self._asked = kinematics.jacobian(self._robot, old_q).T @ self._force
-        foot = kinematics.foot_position(self._robot, q)
-        self.flying |= bool(np.hypot(*foot) >= self._hop.length)
-        self._old = (q, qd, self.flying)
-
-    def torque(self, q: Array, qd: Array) -> Array:
+    def torque(self, now: float, q: Array, qd: Array) -> Array:
         """Return what motors are asked for, N m, (2,)."""
-        del q, qd
-        return self._asked
+        hop = self._hop
+        row = int(np.searchsorted(hop.time, now + 1e-9, side="right")) - 1
+        if row > self._row or now > hop.time[-1]:
+            self._row, self._old, self._newest = row, self._newest, (q, qd)
+        return self._asked(now, min(row, len(hop.time) - 2))
 
+    def _asked(self, now: float, row: int) -> Array:
+        if now <= self.flying_s + _AFTER:
+            return np.asarray(self._hop.torque[row + 1])
+        return self._flight()
 
-class _Rail:
-    """The push gives what the motors gave at the same length of the leg; the flight is a PD."""
-
-    period = _RAIL_PERIOD
-
-    def __init__(self, hop: Hop) -> None:
-        self._robot, self._hop = controllers_robot("rail"), hop
-        pushed = slice(0, hop.lift_off)
-        foot = kinematics.foot_position(self._robot, hop.q[pushed])
-        self._lengths = np.maximum.accumulate(np.hypot(*foot.T))
-        self._pushed = hop.torque[pushed]
-        self._given: Array = self._pushed[0]
-        self.flying = False
-
-    def sense(self, q: Array, qd: Array, now: float) -> None:
-        """Take a sample."""
-        del qd, now
-        length = float(np.hypot(*kinematics.foot_position(self._robot, q)))
-        self.flying |= length >= self._hop.length
-        self._given = np.array(
-            [np.interp(length, self._lengths, column) for column in self._pushed.T]
-        )
-
-    def torque(self, q: Array, qd: Array) -> Array:
-        """Return what motors are asked for, N m, (2,)."""
-        if not self.flying:
-            return self._given
-        stiffness, damping = FLIGHT_GAINS
+    def _flight(self) -> Array:
+        """Return the PD's torque, of the row before."""
+        q, qd = self._old
+        stiffness, damping = np.array(self._rig.stiffness), np.array(self._rig.damping)
         return np.asarray(stiffness * (self._hop.target - q) - damping * qd)
+
+
+class _Law(_Measured):
+    """A constant force until the leg is long enough, then a PD; each from the row before."""
+
+    def __init__(self, hop: Hop) -> None:
+        super().__init__(hop)
+        self._robot, self._belt = controllers_robot(hop.rig), np.array([1.0, 2.0])
+        self._force = force_of(self._robot, hop.q[0], hop.command[1] / self._belt)
+        self.flying_s = np.nan
+        self._sent, self._seen = np.median(hop.torque[:2], axis=0), 0
+
+    def _asked(self, now: float, row: int) -> Array:
+        if self._row == self._seen:  # commands hold from row to row
+            return np.asarray(self._sent)
+        self._seen = self._row
+        length = float(np.hypot(*kinematics.foot_position(self._robot, self._newest[0])))
+        if np.isnan(self.flying_s) and length >= self._hop.length:
+            self.flying_s = now
+        if np.isfinite(self.flying_s):
+            self._sent = self._flight()
+        else:
+            push = self._belt * (kinematics.jacobian(self._robot, self._old[0]).T @ self._force)
+            self._sent = push * min(1.0, self._rig.limit / max(np.abs(push).max(), 1e-9))
+        return np.asarray(self._sent)
+
+
+def fall_apex(flight: float) -> float:
+    """Return how high a flight of so many seconds rises on the rail, m."""
+    return GRAVITY / 8 * flight**2

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hopping_leg.robot import JOINTS, Boom, DriveMismatch, get_spec, load_robot
+from hopping_leg.robot import GRAVITY, JOINTS, Boom, DriveMismatch, dynamics, get_spec, load_robot
 from hopping_leg.sim import LegSimulator, leg_physics
 from hopping_leg.sim.compiled import compiled
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, Range, sample
@@ -251,3 +251,32 @@ def test_the_acceleration_obeys_gauss_principle(seed, count, sliding, boom):
     residual = mass @ a - force - given_by_rows - given_by_friction
     scale = np.abs(mass) @ np.abs(a) + np.abs(force) + np.abs(given_by_rows)
     assert (np.abs(residual) <= 1e-8 * scale.max()).all()
+
+
+def test_energy_stays_what_it_is_on_a_booms_arc():
+    """Of a frictionless leg in the air: inertia grows away from the pivot's height, weight not."""
+    boom = Boom(1.1, 0.3, 0.38, masses=((1.3, -0.7, 0.3), (0.5, 0.4, 0.0)))
+    robot = dataclasses.replace(
+        with_joints(load_robot("legv2"), friction=0.0, damping=0.0), boom=boom
+    )
+    legs = LegSimulator(robot, 1, timestep=2e-5)
+    legs.place(slice(None), 0.6, np.array([0.3, -1.0]))
+    legs.state[:, 3:] = [2.0, 3.0, -4.0]
+    legs.forget(slice(None))
+    legs.records["forward"] = 0.5
+    energies = []
+    for _ in range(40):
+        x, q1, q2, v, w1, w2 = legs.state[0]
+        p, lean, y = legs.table[0], (legs.state[0, 0] - 0.3) / 1.1, legs.records["forward"][0]
+        m = dynamics.mass_matrix(robot, legs.q)[0]
+        m[0, 0] = p["mass"] / (1 - lean**2)
+        speed = np.array([v, w1, w2])
+        swing = p["thigh_moment"] * np.cos(q1) * w1 + p["shank_moment"] * np.cos(q1 + q2) * (
+            w1 + w2
+        )
+        kinetic = speed @ m @ speed / 2 + p["forward_mass"] * y**2 / 2 + y * swing
+        sag = p["thigh_moment"] * np.cos(q1) + p["shank_moment"] * np.cos(q1 + q2)
+        energies.append(kinetic + p["weight"] * x - GRAVITY * sag)
+        legs.step(np.zeros((1, 2)))
+    assert abs(lean) > 0.3
+    assert np.ptp(energies) < 2e-4 * kinetic

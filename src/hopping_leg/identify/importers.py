@@ -16,6 +16,7 @@ from hopping_leg.identify.recording_format import PAIRS, RecordingMetadata, cast
 from hopping_leg.io import parse_toml, read_dataclass
 from hopping_leg.robot import JOINTS, Boom, load_robot
 
+
 @dataclass(frozen=True)
 class LogFormat:
     """Tables of one rig's logger."""

@@ -155,9 +155,11 @@ def _read(path: Path, origin: str) -> tuple[pl.DataFrame, dict[str, Any], str]:
         raise RecordingError(f"{path} is a folder without .mcap or .db3 files, no bag.")
     digest = hashlib.sha256(content).hexdigest()
     if logs:
-        return pl.concat(
-            [_read_csv(f.read_bytes(), str(f)) for f in logs], how="horizontal"
-        ), {}, digest
+        return (
+            pl.concat([_read_csv(f.read_bytes(), str(f)) for f in logs], how="horizontal"),
+            {},
+            digest,
+        )
     if bag:
         return *read_bag(path, origin), digest
     if content.startswith(_PARQUET):
