@@ -155,7 +155,7 @@ def _coverage(
     error = np.array([errors(h, s)["apex"] for h, s in zip(hops, found, strict=True)])
     runs = np.array([hop.run for hop in hops])
     inside, halves = [], []
-    for k in np.flatnonzero(np.isfinite(error)):
+    for k in np.flatnonzero(np.isfinite(error)).tolist():
         scatter = error[(runs != runs[k]) & np.isfinite(error)]
         centres = [one[k].rise.max() for one in spread] or [found[k].rise.max()]
         possible = np.subtract.outer(centres, scatter).ravel()
@@ -167,7 +167,7 @@ def _coverage(
 
 @styled
 def figure(shown: Sequence[Any]) -> Figure:
-    """Draw simulated over recorded apexes on the booms: as measured torques push, and by the law."""
+    """Draw simulated over recorded apexes on the booms, pushed as measured and by the law."""
     drawn = Figure(figsize=(WIDTH, 3.6), layout="constrained")
     booms = [(rig, hops, found) for rig, hops, found in shown if hops[0].boom.radius]
     axes = drawn.subplots(1, len(DRIVES), sharey=True)

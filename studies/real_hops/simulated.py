@@ -66,8 +66,8 @@ def simulate(
     pushes = [(_Law if by_law and hop.boom.radius else _Measured)(hop) for hop in hops]
     start, landing = legs.height.copy(), _landings(hops)
     ticks = round(_LONGEST / _TICK)
-    q, torque = np.zeros((2, ticks, len(hops), 2))
-    rise, speed = np.zeros((2, ticks, len(hops)))
+    q, torque = np.zeros((2, ticks, len(hops), 2), np.float64)
+    rise, speed = np.zeros((2, ticks, len(hops)), np.float64)
     clear, lowered = np.zeros((ticks, len(hops))), np.zeros(len(hops))
     for tick in range(ticks):
         q[tick], qd = legs.measured_q, legs.measured_qd
@@ -78,9 +78,9 @@ def simulate(
         lowered = np.where(descends, landing, lowered)
         rise[tick], speed[tick] = legs.height + lowered - start, legs.height_rate
         clear[tick] = legs.foot_clearance() - (landing - lowered)
-        asked = [p.torque(tick * _TICK, *s) for p, s in zip(pushes, zip(q[tick], qd), strict=True)]
-        torque[tick] = legs.step(np.array(asked))
-    time = np.arange(ticks) * _TICK
+        seen = zip(pushes, q[tick], qd, strict=True)
+        torque[tick] = legs.step(np.array([p.torque(tick * _TICK, *one) for p, *one in seen]))
+    time: Array = np.arange(ticks) * _TICK
     found = []
     for k, push in enumerate(pushes):
         falling = (time > push.flying_s + _AFTER) & (speed[:, k] < 0) & (clear[:, k] <= 0)
@@ -93,7 +93,7 @@ def simulate(
 
 
 def _place(legs: LegSimulator, hops: Sequence[Hop], q0: Array, standing: Array) -> None:
-    """Let legs stand with their feet still, belts stretched by what the standing leg's motors gave."""
+    """Let legs stand with their feet still, belts stretched by what motors gave."""
     stiffness = np.array([robot.reality.of_drives("stiffness") for robot in legs.robots])
     link = q0 - np.nan_to_num(standing / stiffness)
     legs.place(slice(None), 0.0, link)

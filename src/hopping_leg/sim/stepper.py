@@ -242,7 +242,7 @@ def advance(
     dt: float,
     forward: bool,
 ) -> None:
-    """Advance one leg by physics steps, on a rail or, with ``forward``, on a boom.
+    """Advance one leg by physics steps.
 
     Args:
         p: The leg's row of the table.
@@ -253,6 +253,7 @@ def advance(
         push: Upward force on the base, N.
         steps: How many.
         dt: Physics step, s.
+        forward: Whether it is on a boom and moves forward, or on the rail.
     """
     x, q1, q2, v0, v1, v2 = state[0], state[1], state[2], state[3], state[4], state[5]
     t1, t2, w1, w2 = memory.rotor[0], memory.rotor[1], memory.rotor[2], memory.rotor[3]
