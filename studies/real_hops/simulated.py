@@ -80,7 +80,7 @@ def simulate(
         clear[tick] = legs.foot_clearance() - (landing - lowered)
         seen = zip(pushes, q[tick], qd, strict=True)
         torque[tick] = legs.step(np.array([p.torque(tick * _TICK, *one) for p, *one in seen]))
-    time: Array = np.arange(ticks) * _TICK
+    time = np.linspace(0.0, (ticks - 1) * _TICK, ticks)
     found = []
     for k, push in enumerate(pushes):
         falling = (time > push.flying_s + _AFTER) & (speed[:, k] < 0) & (clear[:, k] <= 0)
