@@ -145,7 +145,7 @@ def read_recording(path: Path) -> tuple[FlightRecorderTail, Array]:
 def recover(path: Path) -> trace.Trace:
     """Return the common trace of a run from its flight recording.
 
-    Columns of the true height, which hardware does not know, hold NaN.
+    What hardware does not know of the base holds NaN.
 
     Raises:
         TraceError: The file is missing, no flight recording, or holds no tick.
@@ -153,9 +153,8 @@ def recover(path: Path) -> trace.Trace:
     box, rows = read_recording(path)
     if not len(rows):
         raise errors.TraceError(f"{path} holds no tick; the run had not begun.")
-    unknown = ("height_m", "height_rate_m_s")
-    clearances = tuple(f"{part}_clearance_m" for part in ("foot", "knee", "base"))
-    missing = [name for name in (*unknown, *clearances) if name not in box.columns]
+    heights = [name for name in trace.COLUMNS if "height" in name or "clearance" in name]
+    missing = [name for name in heights if name not in box.columns]
     table = pl.DataFrame(dict(zip(box.columns, rows.T, strict=True))).with_columns(
         pl.lit(float("nan")).alias(name) for name in missing
     )

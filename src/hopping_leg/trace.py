@@ -22,7 +22,7 @@ SCHEMA = 1
 COLUMNS = {
     "time_s": "start of the control period",
     "command_m": "desired apex height of the base",
-    "height_m": "true base height; missing on hardware",
+    "height_m": "true base height; on hardware as measured, if it is",
     "height_rate_m_s": "true base velocity; missing on hardware",
     "hip_position_rad": "true joint position, measured on hardware",
     "knee_position_rad": "true joint position, measured on hardware",
@@ -37,6 +37,12 @@ COLUMNS = {
     "base_clearance_m": "gap between base and ground",
 }
 """Every column a trace may rely on; controllers may add their own."""
+
+
+def interpolated(name: str) -> pl.Expr:
+    """Return a column with its gaps, NaN or null, filled by up to ten ticks of a straight line."""
+    known = pl.col(name).cast(pl.Float64, strict=False).fill_nan(None)
+    return pl.when(known.forward_fill(10).is_not_null()).then(known.interpolate())
 
 
 def read_parquet(

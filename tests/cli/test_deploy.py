@@ -1,6 +1,7 @@
 """The verbs that talk to motors, emulated in lockstep, and those that excite and record."""
 
 import functools
+import itertools
 import signal
 import subprocess
 import sys
@@ -8,15 +9,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from moteus.protocol import Register
 
 from hopping_leg.cli import main
 from hopping_leg.controllers.joint_pd import JointGains
 from hopping_leg.emulator.faults import Fault
+from hopping_leg.evaluate.trials import load_run
+from hopping_leg.hop_detection import find_hops, trace_hops
 from hopping_leg.identify.excitation import load_excitation
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.robot import DEFAULT_ROBOT
 from hopping_leg.trace import Trace
 from tests.cli.emulated import put_behind, write_sine
+from tests.robot.files import written
 
 RUN = ["deploy", "energy-shaping", "--transport", "/dev/leg", "--seconds", "0.3"]
 
@@ -42,6 +47,57 @@ def test_deploy_checks_runs_and_leaves_a_trace(emulate, tmp_path, capsys):
     assert [drive.machine.mode for drive in lockstep.robot.drives] == [0, 0]
     assert main(["report", str(file), "--out", str(tmp_path / "figures")]) == 0
     assert list((tmp_path / "figures").glob("*.svg"))
+
+
+def sensing(tmp_path, source, extends="legv2-paper"):
+    """Write a robot with a height sensor, which is in a boom's pivot if it is an encoder."""
+    numbers = {"zero": (0.3, "1"), "offset": (0.4, "m"), "scale": (2.0, "m")}
+    if source.startswith("encoder"):
+        numbers["radius"] = (1.2, "m")
+    text = {f"hardware.height.{k}": v for k, v in numbers.items()}
+    path = written(tmp_path / "leg.toml", text, extends)
+    with Path(path).open("a") as file:
+        file.write(f'\nhardware.height.source = "{source}"\nhardware.height.drive = "knee"')
+    return path
+
+
+@pytest.mark.parametrize("source", ["encoder_1_position", "aux2_analog_in3", "{}/line"])
+def test_a_measured_height_is_recorded_and_its_apexes_reported(emulate, tmp_path, source):
+    robot = sensing(tmp_path, source.format(tmp_path))
+    lockstep = emulate(robot=robot)
+    drive, answers = lockstep.robot.drives[1], itertools.count()
+
+    def lossy(registers):
+        lost = () if next(answers) % 5 else drive.sensed
+        return {register: value * (register not in lost) for register, value in registers.items()}
+
+    drive.disturbances.report = lossy
+    words = [*RUN[:-1], "3.5", "--robot", robot, "--yes", "--out", str(tmp_path / "run")]
+    assert main(words) == 0
+    (file,) = (tmp_path / "run").iterdir()
+    trace = Trace.load(file)
+    measured = np.stack([trace.column(name) for name in ("height_m", "foot_clearance_m")])
+    known = np.isfinite(measured).all(axis=0).mean()
+    assert known > 0.95 if "line" in source else known == pytest.approx(0.8, abs=0.01)
+    _, *truth = np.array(lockstep.truth)[-measured.shape[1] :, :3].T
+    assert np.nanpercentile(np.abs(measured - truth), 98) < 0.005
+    hops = np.isfinite(trace.column("hip_command_nm"))
+    height, clearance = np.array(truth)[:, hops]
+    true = find_hops(height, np.gradient(height), clearance)
+    run = load_run(file)
+    assert run.controller == "energy-shaping, measured"
+    assert run.trace.column("time_s")[[0, -1]] == pytest.approx([0.0, 3.495])
+    assert len(true.apex) >= 4
+    np.testing.assert_allclose(trace_hops(run.trace).apex, true.apex, atol=0.003)
+    assert main(["report", str(file), "--out", str(tmp_path / "figures")]) == 0
+    assert "energy-shaping, measured" in (tmp_path / "figures" / "heights.svg").read_text()
+
+
+def test_a_height_sensor_that_is_silent_is_named_before_the_leg_moves(emulate, tmp_path, refused):
+    robot = sensing(tmp_path, "encoder_1_position")
+    lockstep = emulate(robot=robot)
+    lockstep.robot.drives[1].disturbances.report = lambda r: r | {Register.ENCODER_VALIDITY: 1}
+    refused([*RUN, "--robot", robot, "--yes"], "the height sensor (encoder_1_position) gives")
 
 
 @pytest.mark.slow
@@ -85,14 +141,16 @@ def test_doctor_says_what_is_wrong_and_puts_it_right(emulate, capsys):
 
 @pytest.mark.parametrize("rig", ["fixed-base", pytest.param("rail", marks=pytest.mark.slow)])
 def test_a_recording_from_motors_is_one_that_identification_takes(emulate, tmp_path, rig):
-    emulate(robot="legv2", faults=(Fault("drop_reply", at=1.0, drive="hip"),))
+    robot = sensing(tmp_path, "aux1_analog_in2", extends="legv2")
+    emulate(robot=robot, faults=(Fault("drop_reply", at=1.0, drive="hip"),))
     file, played = write_sine(tmp_path, rig, 400)
     position = played.position
-    words = ["record", "play", str(file), "--transport", "/dev/leg", "--yes"]
+    words = ["record", "play", str(file), "--transport", "/dev/leg", "--yes", "--robot", robot]
     assert main([*words, "--out", str(tmp_path / "r")]) == 0
-    recording = load_recording(tmp_path / "r" / "legv2-sine.parquet")
+    recording = load_recording(tmp_path / "r" / "mine-sine.parquet")
     assert recording.metadata.rig == rig
-    assert recording.metadata.robot == "legv2"
+    assert recording.metadata.robot == robot
+    assert recording.has_column("height_m") == (rig == "rail")
     assert recording.metadata.onboard == "zoh"
     assert len(recording) == 400
     np.testing.assert_allclose(recording.array("position_command"), position)

@@ -1,5 +1,6 @@
 import dataclasses
 import functools
+import itertools
 import math
 import tomllib
 from operator import getitem
@@ -23,6 +24,7 @@ from hopping_leg.robot import (
     robot_tree,
     shipped_robots,
 )
+from hopping_leg.robot.hardware import HeightSensor
 from tests.robot.files import UNITS, whole, written
 
 SIGNED = ("lower", "upper", "stop_lower", "stop_upper")
@@ -113,6 +115,7 @@ def test_every_mistake_gets_a_sentence_that_names_the_field(tmp_path, path, mist
         ('extends = "legv3"', "Did you mean 'legv"),
         ('extends = "leg.toml"', "circle"),
         ('extends = "legv2"\n[hip]\nbelt_ration = 1', "Did you mean 'belt_ratio'"),
+        ('extends = "legv2"\n[hardware.height]\nsource = "encoder_1"', "mean 'encoder_1_position'"),
     ],
 )
 def test_broken_files_get_a_sentence(tmp_path, content, sentence):
@@ -166,12 +169,25 @@ def test_a_part_may_be_left_out_and_the_wiring_is_no_part_of_the_physics(tmp_pat
         ("hip.motor.peak_torque", 48.0, "N m", "max_current"),
         ("knee.motor.no_load_speed", 78.0, "rad/s", "voltage_high"),
         ("hip.stop_upper", 6.4, "rad", "turns more than once"),
+        ("hardware.height.scale", 0.0, "m", "must not be zero"),
     ],
 )
 def test_numbers_that_cannot_be_name_the_fields(tmp_path, path, value, unit, sentence):
     with pytest.raises(RobotError, match=sentence) as caught:
         load_robot(written(tmp_path / "leg.toml", {path: (value, unit)}, "legv2"))
     assert path.partition(".")[0] in str(caught.value)
+
+
+def test_a_height_sensor_tells_the_height_that_it_reads():
+    pot = HeightSensor("aux2_analog_in1", zero=0.1, offset=0.2, scale=0.5)
+    assert pot.height(0.5) == pytest.approx(0.4)
+    boom = HeightSensor("encoder_1_position", zero=0.9, offset=0.4, radius=1.0, angle=-math.tau)
+    assert boom.height(0.9 - 1 / 12) == pytest.approx(0.9)
+    assert boom.height((0.9 + 1 / 6) % 1) == pytest.approx(0.4 - math.sin(math.pi / 3))
+    for sensor, height in itertools.product((pot, boom), (0.1, 0.4, 0.55)):
+        assert sensor.height(sensor.reading(height)) == pytest.approx(height)
+    assert boom.reading(9.0) == pytest.approx(0.9 - 0.25), "as far as the boom reaches"
+    assert all(math.isnan(pot.height(nothing)) for nothing in (math.nan, math.inf))
 
 
 def test_a_limit_may_be_what_the_hardware_holds(tmp_path):

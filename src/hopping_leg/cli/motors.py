@@ -25,10 +25,10 @@ def connect(robot: Robot, transport: str) -> "contextlib.closing[MoteusLink]":
 def find(
     link: "MoteusLink", robot: Robot, limits: safety_limits.SafetyLimits
 ) -> list[preflight.Finding]:
-    """Return all checks of both drives."""
-    from hopping_leg.deploy.drive_info import inspect
+    """Return all checks of both drives, and of what measures the height."""
+    from hopping_leg.deploy.drive_info import check_height, inspect
 
-    return preflight.check_drives(robot, limits, inspect(link))
+    return [*preflight.check_drives(robot, limits, inspect(link)), *check_height(link)]
 
 
 def check(

@@ -9,8 +9,8 @@ from moteus import multiplex
 from moteus.protocol import Register
 
 from hopping_leg.deploy.moteus_link import MoteusLink
-from hopping_leg.deploy.preflight import DriveInfo, Setting, required_settings
-from hopping_leg.deploy.replies import read_registers
+from hopping_leg.deploy.preflight import DriveInfo, Finding, Setting, required_settings
+from hopping_leg.deploy.replies import read_registers, sensor_reading
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot.parameters import JOINTS
 
@@ -89,6 +89,24 @@ def _inspect(link: MoteusLink, joint: int) -> DriveInfo:
         temperature=float(values.get(Register.TEMPERATURE, math.nan)),
         settings=_settings(link, joint),
     )
+
+
+def check_height(link: MoteusLink) -> list[Finding]:
+    """Check whether the height sensor, if there is one, tells anything within a second."""
+    sensor, height = link.robot.hardware.height, math.nan
+    if not sensor.source:
+        return []
+    joint, until = JOINTS.index(sensor.drive), link.clock.now() + _ANSWER_SECONDS
+    while math.isnan(height) and link.clock.now() < until:
+        link.clock.wait_until(link.clock.now() + _POLL_SECONDS)
+        answer = link.ask(link.controllers[joint].make_query(), _ANSWER_SECONDS)
+        with contextlib.suppress(Exception):  # the answer is damaged, or there is none
+            height = link.height(sensor_reading(read_registers(answer.data if answer else b"")))
+    silent = (
+        f"the height sensor ({sensor.source}) gives nothing; check its wires and settings, or take"
+        " [hardware.height] out of the robot's file."
+    )
+    return [Finding(joint, "base height", f"{height:.3f} m", silent if math.isnan(height) else "")]
 
 
 def _query(link: MoteusLink, joint: int, registers: dict[int, int]) -> dict[int, Any]:

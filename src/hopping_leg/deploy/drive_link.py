@@ -71,6 +71,7 @@ class Reply:
         temperature: Drive's electronics, deg C.
         taken: When it was measured, s on the host's clock.
         ahead: What the drive's clock has gained on the host's, beyond what quartzes do, s.
+        sensed: What a height sensor at its auxiliary ports reads; NaN without one.
     """
 
     position: float
@@ -82,6 +83,7 @@ class Reply:
     temperature: float
     taken: float
     ahead: float = 0.0
+    sensed: float = math.nan
 
 
 Replies = tuple[Reply | None, Reply | None]
@@ -121,6 +123,10 @@ class Exchange:
     """Fresh ones: measured after this tick's question was asked."""
     late: tuple[tuple[int, Reply], ...] = ()
     """Drive (0 hip, 1 knee) and reply to an earlier tick that arrived now."""
+    height: float = math.nan
+    """Measured base height, m; NaN where nothing new was measured."""
+    clearance: float = math.nan
+    """Gap between foot and ground that follows from it, m."""
 
 
 class DriveLink(Protocol):

@@ -1,5 +1,7 @@
 """Lines to and from an fdcanusb, read and written without ever waiting for it."""
 
+import contextlib
+import math
 import os
 import select
 import time
@@ -113,6 +115,33 @@ class Fdcanusb(LineTransport):
 
     def close(self) -> None:
         """Close the port; another may be opened after it."""
+        self._port.close()
+        self._lock.close()
+
+
+class SerialSensor:
+    """A sensor's serial line, on which every line begins with a number; never waits.
+
+    Raises:
+        HardwareError: The port is missing, in use or cannot be opened.
+    """
+
+    def __init__(self, path: str, baud: float) -> None:
+        self._lock = locks.DeviceLock(Path(path), HardwareError)
+        self._port = opened(self._lock.close, lambda: serial.Serial(path, int(baud), timeout=0))
+        self._lines, self._count = LineBuffer(), 0
+
+    def newest(self) -> float:
+        """Return the newest number, NaN if no line has ended since the last call."""
+        with contextlib.suppress(OSError, ValueError):  # nothing is there, or it is no number
+            lines = self._lines.feed(os.read(self._port.fileno(), 65536))
+            self._count += len(lines)
+            if lines and self._count > 1:  # the first may have lost its beginning
+                return float(lines[-1].split()[0])
+        return math.nan
+
+    def close(self) -> None:
+        """Close the port."""
         self._port.close()
         self._lock.close()
 

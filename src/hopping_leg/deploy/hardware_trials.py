@@ -204,6 +204,7 @@ def header_of(
         "controller": controller.name,
         **policy,
         "rate_hz": rate,
+        "height_sensor": robot.hardware.height.source,
         "started": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "versions": versions(*_PACKAGES),
         "codes": {

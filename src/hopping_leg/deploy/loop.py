@@ -30,6 +30,7 @@ _WARM_TICKS = 10  # Ticks of listening before the operator's arming takes effect
 _STOP_TICKS = 10  # Ticks in which the drives are told to stop at the end
 _REMEMBERED = 16  # Ticks; older samples are forgotten
 _LOOP = ("time_s", "command_m", "state", "reason", "part", "action")
+_HEIGHTS = ("height_m", "foot_clearance_m")
 _TIMES = ("wake_late_s", "exchange_s", "control_s", "tick_s", "skipped_ticks")
 _MEASURED = ("position", "velocity", "torque")
 _DRIVE = ("mode", "fault", "voltage", "temperature")
@@ -46,7 +47,7 @@ def columns(controller: Controller) -> tuple[str, ...]:
         ControllerError: It names one of the loop's for its own.
     """
     drives = tuple(f"{joint}_{name}" for name in _DRIVE_COLUMNS for joint in JOINTS)
-    names, own = (*_LOOP, *_TIMES, *drives), _internal_names(controller)
+    names, own = (*_LOOP, *_HEIGHTS, *_TIMES, *drives), _internal_names(controller)
     if taken := sorted({*names} & {*own}):
         raise ControllerError(
             f"'internals' of controller '{controller.name}' names '{taken[0]}', which every run"
@@ -215,7 +216,7 @@ class ControlLoop:
         """Record the row of a tick; measurements are NaN where no fresh reply came."""
         fresh, last = exchange.replies, after.counts.last
         parts = (after.state, after.cause.reason, step.phase, outgoing.action.value)
-        values = [time, step.command, *parts, *timings]
+        values = [time, step.command, *parts, exchange.height, exchange.clearance, *timings]
         for replies, names in ((fresh, _MEASURED), (last, _DRIVE)):
             values += [getattr(reply, name, math.nan) for name in names for reply in replies]
         values += [float(reply is not None) for reply in fresh]

@@ -7,14 +7,19 @@ What the frames say is the client library's, ``moteus``.
 import math
 import struct
 from collections.abc import Iterator
+from dataclasses import replace
 
+import numpy as np
 from moteus import Controller, QueryResolution, multiplex
 from moteus.command import Command
 from moteus.protocol import Register
 
 from hopping_leg.deploy import drive_link, frames, realtime, replies
+from hopping_leg.deploy.fdcanusb import SerialSensor
 from hopping_leg.deploy.transport import Transport
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import kinematics
+from hopping_leg.robot.hardware import SENSOR_REGISTERS, HeightSensor
+from hopping_leg.robot.parameters import JOINTS, Robot
 
 _NO_POSITION_CONTROL = {"position": math.nan, "velocity": 0.0} | dict.fromkeys(
     ("kp_scale", "kd_scale", "ilimit_scale"), 0.0
@@ -42,9 +47,11 @@ class MoteusLink:
         self.robot, self.transforms = robot, drive_link.joint_transforms(robot)
         self.transport = transport
         self._clocks = (replies.DriveClock(), replies.DriveClock())
-        resolution = _resolution()
+        sensor = robot.hardware.height
+        self._line = SerialSensor(sensor.source, sensor.baud) if sensor.serial else None
         self.controllers = [
-            Controller(wire.id, query_resolution=resolution) for wire in self.transforms
+            Controller(wire.id, query_resolution=_resolution(sensor, joint))
+            for joint, wire in zip(JOINTS, self.transforms, strict=True)
         ]
         self._made = {
             (action, query): self._make(action, query=query)
@@ -65,7 +72,18 @@ class MoteusLink:
             question.take(frame, self.clock.now())
             if question.answered:
                 break
-        return question.result()
+        found = question.result()
+        if not self.robot.hardware.height.source:
+            return found
+        sensed = [reply.sensed for reply in found.replies if reply]
+        height = self.height(next(filter(math.isfinite, sensed), math.nan))
+        q = np.array([reply.position if reply else math.nan for reply in found.replies])
+        clearance = kinematics.foot_clearance(self.robot, np.array(height), q)
+        return replace(found, height=height, clearance=float(clearance))
+
+    def height(self, sensed: float) -> float:
+        """Return the base height, m, by what a drive or the sensor's own line reads; may be NaN."""
+        return self.robot.hardware.height.height(self._line.newest() if self._line else sensed)
 
     def send(self, outgoing: drive_link.DriveCommand) -> None:
         """Tell both drives what to do; returns at once."""
@@ -87,6 +105,8 @@ class MoteusLink:
     def close(self) -> None:
         """Give the adapter back; another link may open it then."""
         self.transport.close()
+        if self._line:
+            self._line.close()
 
     def _arriving(self, until: float) -> Iterator[frames.Frame]:
         """Yield frames as they arrive; ends at a time, s, however many there are."""
@@ -137,8 +157,11 @@ def _frame(command: Command) -> frames.Frame:
     return frames.Frame(number, command.data)
 
 
-def _resolution() -> QueryResolution:
+def _resolution(sensor: HeightSensor, joint: str) -> QueryResolution:
     resolution = QueryResolution()
     resolution.voltage = resolution.temperature = multiplex.INT16
     resolution._extra = {int(Register.MILLISECOND_COUNTER): multiplex.INT32}
+    if joint == sensor.drive and sensor.source in SENSOR_REGISTERS:
+        resolution._extra[int(Register[sensor.source.upper()])] = multiplex.F32
+        resolution._extra[int(Register.ENCODER_VALIDITY)] = multiplex.INT8
     return resolution

@@ -20,6 +20,10 @@ _DRIFT = 2e-4  # Most that two clocks drift apart, s/s: both are quartzes
 _RESTART = -500
 """A counter that falls back further than this, ms, began anew: no reply is held up so long."""
 
+_ANALOG = range(Register.AUX1_ANALOG_IN1, Register.AUX2_ANALOG_IN5 + 1)
+_ENCODERS = {Register.ENCODER_1_POSITION: 0b100, Register.ENCODER_2_POSITION: 0b10000}
+"""Positions of a drive's further encoders, and their bits in the validity."""
+
 _FIRST = 20  # replies with which a clock is compared
 
 SLACK = 0.0015
@@ -113,6 +117,17 @@ def read_registers(data: bytes) -> dict[int, Any]:
     return values
 
 
+def sensor_reading(values: dict[int, Any]) -> float:
+    """Return what a drive reads of a height sensor, NaN if nothing.
+
+    An encoder must be valid; an analogue input at zero has no function, or no wire.
+    """
+    valid = int(values.get(Register.ENCODER_VALIDITY, 0))
+    read = [value for register, value in values.items() if register in _ANALOG and value]
+    read += [values[r] for r, bit in _ENCODERS.items() if r in values and valid & bit]
+    return float(read[0]) if read else math.nan
+
+
 def read_reply(
     data: bytes, transform: JointTransform, clock: DriveClock, now: float
 ) -> Reply | None:
@@ -123,7 +138,7 @@ def read_reply(
         mode, fault = int(values[Register.MODE]), int(values[Register.FAULT])
         position, velocity = values[Register.POSITION], values[Register.VELOCITY]
         torque, voltage = values[Register.TORQUE], values[Register.VOLTAGE]
-        temperature = values[Register.TEMPERATURE]
+        temperature, sensed = values[Register.TEMPERATURE], sensor_reading(values)
     except Exception:
         return None
     taken = clock.date(int(counter), now)
@@ -139,4 +154,5 @@ def read_reply(
         float(temperature),
         taken,
         clock.ahead,
+        sensed,
     )

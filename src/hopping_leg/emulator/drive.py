@@ -69,6 +69,7 @@ class EmulatedDrive:
         self.diagnostic = diagnostic.Diagnostic(settings, self.encoder, self.stop)
         self.disturbances = Disturbances()
         self.uptime = 0.0
+        self.sensed: dict[int, float] = {}  # What its auxiliary ports read, by register
         self._brake, self.nominal_voltage = brake * 2 * math.pi, voltage
         self._commanded = False
         self._warmth = self._velocity = self._torque = self._asked = 0.0
@@ -213,4 +214,5 @@ class EmulatedDrive:
             Register.CONTROL_TORQUE: self._asked,
             Register.MILLISECOND_COUNTER: int(self.uptime * 1000),
             Register.MULTIPLEX_ID: self.id,
+            **self.sensed,
         }

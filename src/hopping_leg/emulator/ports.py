@@ -54,6 +54,7 @@ class LinePort(ABC):
     """The adapter's end of a serial line."""
 
     def __init__(self) -> None:
+        self.sensor: LinePort | None = None  # A height sensor's own line
         self.plug_in()
 
     @property
@@ -78,6 +79,8 @@ class LinePort(ABC):
         """Take the line away for good."""
         if self.plugged:
             self.unplug()
+        if self.sensor is not None:
+            self.sensor.close()
 
     def fileno(self) -> int:
         """Return the descriptor to wait for; -1 while unplugged."""

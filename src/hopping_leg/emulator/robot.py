@@ -22,9 +22,11 @@ from hopping_leg.emulator.drive import EmulatedDrive
 from hopping_leg.emulator.faults import KINDS, Delivery, Fault, FaultKind
 from hopping_leg.emulator.reply_queue import QueuedReply, TimedQueue
 from hopping_leg.robot import JOINTS, REGISTER_MAP, Robot
+from hopping_leg.robot.hardware import SENSOR_REGISTERS
 
 _MODEL = 0x0000  # Board r4
 _FIRMWARE = 0x010D  # Firmware version in its binary-coded form
+_ALL_VALID = 0b111111
 _AIRBORNE = 0.01  # Height of the foot in a flight that counts as the first, m: no bounce
 
 
@@ -130,6 +132,11 @@ class EmulatedRobot:
         self._sense()
 
     def _sense(self) -> None:
+        sensor = self.robot.hardware.height
+        if sensor.source in SENSOR_REGISTERS:
+            reading = {Register[sensor.source.upper()]: sensor.reading(self.leg.height)}
+            valid = {Register.ENCODER_VALIDITY: _ALL_VALID}
+            self.drives[JOINTS.index(sensor.drive)].sensed = reading | valid
         for joint, drive in enumerate(self.drives):
             drive.update_sensors(*self.leg.sensed(joint))
             if self.observer is not None:

@@ -16,6 +16,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.leg import TIMESTEP
 from hopping_leg.emulator.ports import LinePort, PtyPort
+from hopping_leg.emulator.reply_queue import QueuedReply
 from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, kinematics, load_robot
@@ -142,6 +143,11 @@ def serve(robot: EmulatedRobot, port: LinePort, *, ready: bool) -> None:
 
     ``ready`` tells that the host may have sent something.
     """
+    sensor = robot.robot.hardware.height
+    if sensor.serial:
+        port.sensor = port.sensor or PtyPort(Path(sensor.source))
+        reading = sensor.reading(robot.leg.height)
+        port.sensor.send(QueuedReply(noise=b"%.6f" % reading))
     if ready and port.plugged:
         for frame in port.receive():
             robot.receive(frame)

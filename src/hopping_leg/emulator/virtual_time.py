@@ -34,6 +34,7 @@ class Lockstep:
         self.robot, robot.wire_time = robot, _WIRE_TIME
         self.truth: list[tuple[float, ...]] = []
         self._port = _Pair()
+        server.serve(robot, self._port, ready=False)
         self.link = MoteusLink(robot.robot, _Host(self, self._port, checksums), self)
 
     def now(self) -> float:

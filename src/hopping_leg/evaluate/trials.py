@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 
 from hopping_leg import errors, io
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
@@ -13,7 +14,7 @@ from hopping_leg.evaluate.metrics import stretches
 from hopping_leg.flight_recording import load_trace
 from hopping_leg.robot import GroundMismatch, Robot, command_limits
 from hopping_leg.robot.parameters import Contact
-from hopping_leg.trace import Trace
+from hopping_leg.trace import Trace, interpolated
 
 COMMANDS = (0.25, 0.30, 0.35)
 """Apex heights the paper trains and tests, m, for a leg of the paper's size."""
@@ -161,16 +162,37 @@ def save_traces(runs: Sequence[Run], directory: Path) -> list[Path]:
 
 
 def load_run(path: Path) -> Run:
-    """Load a trace as a run; traces from elsewhere count as fixed trials of their own."""
+    """Load a trace as a run; traces from elsewhere count as fixed trials of their own.
+
+    The name of a controller whose height was measured on hardware says so.
+    """
     trace = load_trace(path)
+    hopping = measured_hopping(trace)
+    trace, measured = (trace, "") if hopping is None else (hopping, ", measured")
     command, time = trace.column("command_m"), trace.column("time_s")
     period = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     steps = tuple((float(command[a]), (b - a) * period) for a, b in stretches(command))
     header = trace.header
     default = "fixed" if len(steps) == 1 else "sequence"
     return Run(
-        controller=str(header.get("controller", path.stem)),
+        controller=str(header.get("controller", path.stem)) + measured,
         trial=Trial(steps, str(header.get("kind", default))),
         repeat=int(header.get("repeat", 0)),
         trace=trace,
     )
+
+
+def measured_hopping(trace: Trace) -> Trace | None:
+    """Return the hopping of a trial on hardware, from time zero, with the rate of its height.
+
+    Short gaps of the heights are interpolated; None where no hopping was measured.
+    """
+    if not trace.header.get("height_sensor") or trace.table.height < 2:
+        return None
+    table = trace.table.with_columns(interpolated("^(height|.*_clearance)_m$"))
+    rate = np.gradient(Trace(table).column("height_m"), trace.column("time_s"))
+    hops = np.isfinite(trace.column("hip_command_nm"))
+    hopping = table.with_columns(height_rate_m_s=rate).filter(hops)
+    if hopping["height_m"].null_count() == hopping.height:
+        return None
+    return Trace(hopping.with_columns(pl.col("time_s") - pl.col("time_s").first()), trace.header)

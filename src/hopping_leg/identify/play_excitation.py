@@ -13,7 +13,7 @@ from hopping_leg.identify.recording import Recording, make_recording
 from hopping_leg.identify.recording_format import MEASURED, RecordingMetadata
 from hopping_leg.robot import TIMESTEP, Robot
 from hopping_leg.sim import NO_NOISE, LegSimulator, Plant
-from hopping_leg.trace import Trace
+from hopping_leg.trace import Trace, interpolated
 
 _IMPOSSIBLE = 1e4  # joint speed that no leg reaches, rad/s
 
@@ -90,20 +90,25 @@ def recording_of(
     """Return the part of a run's trace in which the excitation was played.
 
     Each row holds what the drives reported when the command of the row was computed; ticks without
-    a reply have no measurement. The joint PD runs on the host, once per row; ``believed`` is the
-    robot file that the recording is filed under. RecordingError says that it was not played.
+    a reply have no measurement. The base height is there if a rig that moves was measured, without
+    a long gap. The joint PD runs on the host, once per row; ``believed`` is the robot file that the
+    recording is filed under. RecordingError says that it was not played.
     """
-    lacking = [column for column in MEASURED + TARGETS if column not in trace.table.columns]
+    columns = (*MEASURED, *TARGETS, "height_m")
+    lacking = [column for column in columns if column not in trace.table.columns]
     if lacking:
         raise RecordingError(f"{name} has no column '{lacking[0]}'; no excitation was played.")
-    table = trace.table.filter(pl.col(TARGETS[0]).is_finite())
+    table = trace.table.with_columns(interpolated("height_m"))
+    table = table.filter(pl.col(TARGETS[0]).is_finite())
     if not table.height:
         raise RecordingError(f"{name} ended before the excitation began; see its events.")
     first = float(table["time_s"][0])
     time = np.round(table["time_s"].to_numpy() - first, 9)
     source = f"motors on {trace.header.get('transport')}, {trace.header.get('started')}"
     run = {k: v for k, v in trace.header.items() if k != "events"}
-    table = table.select(pl.Series("time_s", time), *MEASURED, *TARGETS)
+    table = table.select(pl.Series("time_s", time), *columns)
+    if excitation.rig == "fixed-base" or table["height_m"].null_count():
+        table = table.drop("height_m")
     metadata = _metadata(excitation, believed, source, gains)
     header = {"run": run, "excitation": excitation.description}
     return make_recording(table, metadata, name, header=header)

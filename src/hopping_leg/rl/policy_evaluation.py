@@ -14,7 +14,7 @@ from hopping_leg import io
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.controllers.rollout import Rollout, RolloutConfig, rollout
-from hopping_leg.hop_detection import HopMeasurement, measure_hops
+from hopping_leg.hop_detection import COLUMNS, HopMeasurement, measure_hops
 from hopping_leg.rl.onnx_export import every_centimetre, with_shifts
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot.parameters import JOINTS, Robot
@@ -144,13 +144,12 @@ def as_rows(results: list[CommandResult]) -> list[dict[str, Any]]:
 
 def _command_result(runs: list[Rollout], command: float, legs: range, rate: float) -> CommandResult:
     start = round(SETTLE * len(runs[0].time))
-    columns = ("height_m", "height_rate_m_s", "foot_clearance_m")
     hops: list[HopMeasurement] = []
     contacts, lowest = 0, np.inf
     for run in runs:
         for leg in legs:
             data = {name: values[:, leg] for name, values in run.data.items()}
-            height, velocity, clearance = (data[name] for name in columns)
+            height, velocity, clearance = (data[name] for name in COLUMNS)
             hops.append(measure_hops(height, velocity, clearance, rate, start))
             body = np.minimum(data["base_clearance_m"], data["knee_clearance_m"])
             contacts += int((body <= 0).sum())

@@ -6,7 +6,9 @@ left out; the defaults are leg V2's: mjbots qdd100 at 24 V, hip 1, knee 2.
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
+from hopping_leg.errors import RobotError, unknown_name
 from hopping_leg.io import quantity
 
 REGISTER_MAP = 5
@@ -38,12 +40,73 @@ class Servo:
     """Serial number of the drive's controller, 24 hex digits; empty accepts any."""
 
 
+_INPUTS = [f"aux{port}_analog_in{pin}" for port in (1, 2) for pin in range(1, 6)]
+SENSOR_REGISTERS = ("encoder_1_position", "encoder_2_position", *_INPUTS)
+"""Registers of a drive that a sensor at its auxiliary ports fills, by the client's names."""
+
+
+@dataclass(frozen=True)
+class HeightSensor:
+    """What measures the base height, which is recorded; nothing else depends on it.
+
+    height = offset + scale (reading - zero)             beside the rail
+    height = offset + radius sin(angle (reading - zero))   in the pivot of a boom
+    """
+
+    source: str = ""
+    """One of ``SENSOR_REGISTERS``, in turns or shares of the drive's 3.3 V, or the path of a serial
+    line on which every line begins with a number; empty without a sensor."""
+    drive: Literal["hip", "knee"] = "hip"
+    """Whose auxiliary port it is."""
+    baud: float = quantity("Bd", 115_200.0)
+    """Of a serial line."""
+    zero: float = quantity("1", 0.0, signed=True)
+    """Reading at the height ``offset``."""
+    offset: float = quantity("m", 0.0, signed=True)
+    """Height of the hip axis at ``zero``, with a boom that of its pivot."""
+    scale: float = quantity("m", 1.0, signed=True)
+    """Rise per unit of the reading, without a boom."""
+    angle: float = quantity("rad", math.tau, signed=True)
+    """Rise of a boom per unit of the reading."""
+    radius: float = quantity("m", 0.0, zero=True)
+    """Of a boom, from its pivot to the hip axis; zero without one."""
+
+    def __post_init__(self) -> None:
+        if self.source and not self.serial and self.source not in SENSOR_REGISTERS:
+            known = unknown_name("height sensor", self.source, SENSOR_REGISTERS)
+            raise RobotError(f"'hardware.height.source': {known} Or give a serial line's path.")
+        if not self.scale * self.angle:
+            raise RobotError("'hardware.height.scale' and its 'angle' must not be zero.")
+
+    @property
+    def serial(self) -> bool:
+        """Whether it has a serial line of its own."""
+        return "/" in self.source
+
+    def height(self, reading: float) -> float:
+        """Return the base height, m, of a reading; NaN for one that is no number."""
+        above = reading - self.zero
+        if not math.isfinite(above):
+            return math.nan
+        if self.source.startswith("encoder"):  # which does not count turns
+            above -= round(above)
+        rise = self.radius * math.sin(self.angle * above) if self.radius else self.scale * above
+        return self.offset + rise
+
+    def reading(self, height: float) -> float:
+        """Return what it reads at a base height, m."""
+        rise, far = height - self.offset, self.radius
+        angle = math.asin(max(-1.0, min(1.0, rise / far))) if far else 0.0
+        return self.zero + (angle / self.angle if far else rise / self.scale)
+
+
 @dataclass(frozen=True)
 class Hardware:
     """Both drives and what they share."""
 
     hip: Servo = field(default_factory=Servo)
     knee: Servo = field(default_factory=Servo)
+    height: HeightSensor = field(default_factory=HeightSensor)
     watchdog: float = quantity("s", 0.02)
     """Time without a command after which a drive brakes by itself: four ticks at 200 Hz."""
     voltage_low: float = quantity("V", 18.0)

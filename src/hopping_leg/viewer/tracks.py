@@ -78,19 +78,20 @@ class Track:
     def extend_by_trace(self, trace: Trace) -> None:
         """Add the rows of a trace; ``note`` says what height is shown where none was measured.
 
-        Hardware does not measure the base height. The controller's own estimate stands in where it
-        recorded one; else the leg is shown standing, at the height its joints give a foot on the
-        ground, which is right in stance and too low in flight. The clearance stays unknown. Joint
-        angles that are missing are those before them.
+        There the controller's own estimate stands in where it recorded one; else the leg is shown
+        standing, at the height its joints give a foot on the ground, which is right in stance and
+        too low in flight. The clearance stays unknown. Joint angles and measured heights that are
+        missing are those before them.
         """
         known, unknown = trace.table.columns, np.full(len(trace.table), np.nan)
         columns = {name: trace.column(name) if name in known else unknown for name in FIELDS}
-        for name in _ANGLES:
+        measured = np.isfinite(columns["height_m"]).any()
+        for name in (*_ANGLES, "height_m") if measured else _ANGLES:
             before = self.field(name)[-1:] if len(self) else [np.nan]
             angle = pl.Series(np.append(before, columns[name])).fill_nan(None)
             angle = angle.fill_null(strategy="forward").fill_null(strategy="backward").fill_null(0)
             columns[name] = angle.to_numpy()[1:]
-        if not np.isfinite(columns["height_m"]).any():
+        if not measured:
             q = np.stack([columns[name] for name in _ANGLES], axis=-1)
             columns["height_m"] = kinematics.stance_height(self.robot, q)
             self.note = "The height was not measured: the leg is shown standing."
@@ -125,8 +126,7 @@ class Track:
     def apexes(self, until: float, seconds: float = 3.0) -> Array:
         """Return the heights of the apexes in the ``seconds`` up to a time, m, (hops,)."""
         first, last = np.searchsorted(self.time, [until - seconds, until + 1e-9])
-        names = ("height_m", "height_rate_m_s", "foot_clearance_m")
-        part = [self.field(name)[first:last] for name in names]
+        part = [self.field(name)[first:last] for name in hop_detection.COLUMNS]
         return hop_detection.find_hops(*part).apex if last - first > 1 else np.zeros(0)
 
     def last_apex(self, until: float) -> float:
