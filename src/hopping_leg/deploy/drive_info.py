@@ -93,20 +93,18 @@ def _inspect(link: MoteusLink, joint: int) -> DriveInfo:
 
 def check_height(link: MoteusLink) -> list[Finding]:
     """Check whether the height sensor, if there is one, tells anything within a second."""
-    sensor, height = link.robot.hardware.height, math.nan
+    sensor, reading = link.robot.hardware.height, math.nan
     if not sensor.source:
         return []
     joint, until = JOINTS.index(sensor.drive), link.clock.now() + _ANSWER_SECONDS
-    while math.isnan(height) and link.clock.now() < until:
+    while math.isnan(reading) and link.clock.now() < until:
         link.clock.wait_until(link.clock.now() + _POLL_SECONDS)
         answer = link.ask(link.controllers[joint].make_query(), _ANSWER_SECONDS)
         with contextlib.suppress(Exception):  # the answer is damaged, or there is none
-            height = link.height(sensor_reading(read_registers(answer.data if answer else b"")))
-    silent = (
-        f"the height sensor ({sensor.source}) gives nothing; check its wires and settings, or take"
-        " [hardware.height] out of the robot's file."
-    )
-    return [Finding(joint, "base height", f"{height:.3f} m", silent if math.isnan(height) else "")]
+            reading = link.sensed(sensor_reading(read_registers(answer.data if answer else b"")))
+    silent = f"the height sensor ({sensor.source}) gives nothing; check its wires and settings."
+    found = f"{sensor.height(reading):.3f} m, reads {reading:.5g}"
+    return [Finding(joint, "base height", found, silent if math.isnan(reading) else "")]
 
 
 def _query(link: MoteusLink, joint: int, registers: dict[int, int]) -> dict[int, Any]:

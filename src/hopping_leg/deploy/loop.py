@@ -9,6 +9,7 @@ import math
 import threading
 import traceback
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,6 @@ from hopping_leg.controllers.protocol import SAMPLES, Controller, Measurement
 from hopping_leg.deploy import flight_recorder, realtime, safety_limits, stop_reasons
 from hopping_leg.deploy.drive_link import BRAKE, STOP, DriveCommand, DriveLink, Exchange, Reply
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceStep
-from hopping_leg.deploy.standing_check import SquatFindings
 from hopping_leg.deploy.supervisor import State, SupervisorState, supervise
 from hopping_leg.errors import ControllerError
 from hopping_leg.robot.parameters import JOINTS
@@ -132,9 +132,9 @@ class ControlLoop:
         self._stop, self._complaint = threading.Event(), ""
         self._asked, self._took, self._abandoned = math.inf, 0.0, False
         self._start = 0.0
-        sequence.report = self._note_squat
+        sequence.report = lambda findings: self._note_asked(squat=asdict(findings))
         if isinstance(sequence.controller, Fallback):
-            sequence.controller.report = self._note_fallback
+            sequence.controller.report = lambda why: self._note_asked(fallback=why)
 
     @property
     def waited(self) -> float:
@@ -255,11 +255,8 @@ class ControlLoop:
             if self._abandoned:
                 raise SystemExit
 
-    def _note_fallback(self, sentence: str) -> None:
-        self._recorder.event(time_s=self._asked - self._start, fallback=sentence)
-
-    def _note_squat(self, findings: SquatFindings) -> None:
-        self._recorder.event(time_s=self._asked - self._start, squat=asdict(findings))
+    def _note_asked(self, **facts: Any) -> None:  # noqa: ANN401
+        self._recorder.event(time_s=self._asked - self._start, **facts)
 
     def _read_internals(self) -> list[float]:
         found = self._sequence.controller.internals()

@@ -48,7 +48,7 @@ class MoteusLink:
         self.transport = transport
         self._clocks = (replies.DriveClock(), replies.DriveClock())
         sensor = robot.hardware.height
-        self._line = SerialSensor(sensor.source, sensor.baud) if sensor.serial else None
+        self._line = SerialSensor(sensor.source, sensor.baud) if "/" in sensor.source else None
         self.controllers = [
             Controller(wire.id, query_resolution=_resolution(sensor, joint))
             for joint, wire in zip(JOINTS, self.transforms, strict=True)
@@ -76,14 +76,15 @@ class MoteusLink:
         if not self.robot.hardware.height.source:
             return found
         sensed = [reply.sensed for reply in found.replies if reply]
-        height = self.height(next(filter(math.isfinite, sensed), math.nan))
+        reading = self.sensed(next(filter(math.isfinite, sensed), math.nan))
+        height = self.robot.hardware.height.height(reading)
         q = np.array([reply.position if reply else math.nan for reply in found.replies])
         clearance = kinematics.foot_clearance(self.robot, np.array(height), q)
         return replace(found, height=height, clearance=float(clearance))
 
-    def height(self, sensed: float) -> float:
-        """Return the base height, m, by what a drive or the sensor's own line reads; may be NaN."""
-        return self.robot.hardware.height.height(self._line.newest() if self._line else sensed)
+    def sensed(self, by_drive: float) -> float:
+        """Return what the height sensor reads, at a drive or on its own line, NaN if nothing."""
+        return self._line.newest() if self._line else by_drive
 
     def send(self, outgoing: drive_link.DriveCommand) -> None:
         """Tell both drives what to do; returns at once."""

@@ -144,7 +144,7 @@ def serve(robot: EmulatedRobot, port: LinePort, *, ready: bool) -> None:
     ``ready`` tells that the host may have sent something.
     """
     sensor = robot.robot.hardware.height
-    if sensor.serial:
+    if "/" in sensor.source:
         port.sensor = port.sensor or PtyPort(Path(sensor.source))
         reading = sensor.reading(robot.leg.height)
         port.sensor.send(QueuedReply(noise=b"%.6f" % reading))

@@ -72,24 +72,17 @@ class HeightSensor:
     """Of a boom, from its pivot to the hip axis; zero without one."""
 
     def __post_init__(self) -> None:
-        if self.source and not self.serial and self.source not in SENSOR_REGISTERS:
+        if self.source and "/" not in self.source and self.source not in SENSOR_REGISTERS:
             known = unknown_name("height sensor", self.source, SENSOR_REGISTERS)
             raise RobotError(f"'hardware.height.source': {known} Or give a serial line's path.")
         if not self.scale * self.angle:
             raise RobotError("'hardware.height.scale' and its 'angle' must not be zero.")
 
-    @property
-    def serial(self) -> bool:
-        """Whether it has a serial line of its own."""
-        return "/" in self.source
-
     def height(self, reading: float) -> float:
         """Return the base height, m, of a reading; NaN for one that is no number."""
-        above = reading - self.zero
-        if not math.isfinite(above):
-            return math.nan
+        above = reading - self.zero if math.isfinite(reading) else math.nan
         if self.source.startswith("encoder"):  # which does not count turns
-            above -= round(above)
+            above = math.remainder(above, 1.0)
         rise = self.radius * math.sin(self.angle * above) if self.radius else self.scale * above
         return self.offset + rise
 
