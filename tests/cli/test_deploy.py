@@ -51,20 +51,18 @@ def test_deploy_checks_runs_and_leaves_a_trace(emulate, tmp_path, capsys):
 
 def sensing(tmp_path, source, extends="legv2-paper"):
     """Write a robot with a height sensor, which is in a boom's pivot if it is an encoder."""
-    numbers = {"zero": (0.3, "1"), "offset": (0.4, "m"), "scale": (2.0, "m")}
-    if source.startswith("encoder"):
-        numbers["radius"] = (1.2, "m")
-    text = {f"hardware.height.{k}": v for k, v in numbers.items()}
-    path = written(tmp_path / "leg.toml", text, extends)
-    with Path(path).open("a") as file:
-        file.write(f'\nhardware.height.source = "{source}"\nhardware.height.drive = "knee"')
-    return path
+    reach = (1.2 * source.startswith("encoder"), "m")
+    numbers = {"zero": (0.3, "1"), "offset": (0.4, "m"), "scale": (2.0, "m"), "radius": reach}
+    text = {f"hardware.height.{name}": number for name, number in numbers.items()}
+    path = Path(written(tmp_path / "leg.toml", text, extends))
+    words = f'hardware.height.source = "{source}"\nhardware.height.drive = "knee"'
+    path.write_text(f"{path.read_text()}\n{words}")
+    return str(path)
 
 
 @pytest.mark.parametrize("source", ["encoder_1_position", "aux2_analog_in3", "{}/line"])
 def test_a_measured_height_is_recorded_and_its_apexes_reported(emulate, tmp_path, source):
-    robot = sensing(tmp_path, source.format(tmp_path))
-    lockstep = emulate(robot=robot)
+    lockstep = emulate(robot=(robot := sensing(tmp_path, source.format(tmp_path))))
     drive, answers = lockstep.robot.drives[1], itertools.count()
 
     def lossy(registers):
@@ -94,8 +92,7 @@ def test_a_measured_height_is_recorded_and_its_apexes_reported(emulate, tmp_path
 
 
 def test_a_height_sensor_that_is_silent_is_named_before_the_leg_moves(emulate, tmp_path, refused):
-    robot = sensing(tmp_path, "encoder_1_position")
-    lockstep = emulate(robot=robot)
+    lockstep = emulate(robot=(robot := sensing(tmp_path, "encoder_1_position")))
     lockstep.robot.drives[1].disturbances.report = lambda r: r | {Register.ENCODER_VALIDITY: 1}
     refused([*RUN, "--robot", robot, "--yes"], "the height sensor (encoder_1_position) gives")
 

@@ -1,5 +1,3 @@
-import math
-
 import numpy as np
 import polars as pl
 import pytest
@@ -91,7 +89,7 @@ def test_what_hop_deploy_records_is_shown_with_the_estimate_of_the_controller(tm
     writer = FlightRecorder(tmp_path / f"es-1{SUFFIX}", names, header)
     seen = {"hip_position_rad": 0.7, "knee_position_rad": -1.4, "knee_torque_nm": 3.0}
     for tick, estimate in enumerate((float("nan"), 0.33)):
-        told = {"time_s": tick / 200, "estimated_height_m": estimate, "height_m": math.nan}
+        told = {"time_s": tick / 200, "estimated_height_m": estimate, "height_m": np.nan}
         writer.row(list((dict.fromkeys(names, 0.0) | seen | told).values()))
     writer.close()
     follow = RecorderSource(tmp_path)

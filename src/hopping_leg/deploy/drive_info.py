@@ -99,9 +99,8 @@ def check_height(link: MoteusLink) -> list[Finding]:
     joint, until = JOINTS.index(sensor.drive), link.clock.now() + _ANSWER_SECONDS
     while math.isnan(reading) and link.clock.now() < until:
         link.clock.wait_until(link.clock.now() + _POLL_SECONDS)
-        answer = link.ask(link.controllers[joint].make_query(), _ANSWER_SECONDS)
-        with contextlib.suppress(Exception):  # the answer is damaged, or there is none
-            reading = link.sensed(sensor_reading(read_registers(answer.data if answer else b"")))
+        values = _query(link, joint, link.controllers[joint].query_resolution._extra)
+        reading = link.sensed(sensor_reading(values))
     silent = f"the height sensor ({sensor.source}) gives nothing; check its wires and settings."
     found = f"{sensor.height(reading):.3f} m, reads {reading:.5g}"
     return [Finding(joint, "base height", found, silent if math.isnan(reading) else "")]

@@ -124,9 +124,8 @@ class Exchange:
     late: tuple[tuple[int, Reply], ...] = ()
     """Drive (0 hip, 1 knee) and reply to an earlier tick that arrived now."""
     height: float = math.nan
-    """Measured base height, m; NaN where nothing new was measured."""
     clearance: float = math.nan
-    """Gap between foot and ground that follows from it, m."""
+    """Measured base height, and the foot's above the ground that follows, m; NaN if not new."""
 
 
 class DriveLink(Protocol):

@@ -26,7 +26,7 @@ from hopping_leg.robot.hardware import SENSOR_REGISTERS
 
 _MODEL = 0x0000  # Board r4
 _FIRMWARE = 0x010D  # Firmware version in its binary-coded form
-_ALL_VALID = 0b111111
+_ALL_VALID = {Register.ENCODER_VALIDITY: 0b111111}
 _AIRBORNE = 0.01  # Height of the foot in a flight that counts as the first, m: no bounce
 
 
@@ -135,8 +135,7 @@ class EmulatedRobot:
         sensor = self.robot.hardware.height
         if sensor.source in SENSOR_REGISTERS:
             reading = {Register[sensor.source.upper()]: sensor.reading(self.leg.height)}
-            valid = {Register.ENCODER_VALIDITY: _ALL_VALID}
-            self.drives[JOINTS.index(sensor.drive)].sensed = reading | valid
+            self.drives[JOINTS.index(sensor.drive)].sensed = reading | _ALL_VALID
         for joint, drive in enumerate(self.drives):
             drive.update_sensors(*self.leg.sensed(joint))
             if self.observer is not None:

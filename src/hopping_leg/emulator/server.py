@@ -146,8 +146,7 @@ def serve(robot: EmulatedRobot, port: LinePort, *, ready: bool) -> None:
     sensor = robot.robot.hardware.height
     if "/" in sensor.source:
         port.sensor = port.sensor or PtyPort(Path(sensor.source))
-        reading = sensor.reading(robot.leg.height)
-        port.sensor.send(QueuedReply(noise=b"%.6f" % reading))
+        port.sensor.send(QueuedReply(noise=b"%.6f" % sensor.reading(robot.leg.height)))
     if ready and port.plugged:
         for frame in port.receive():
             robot.receive(frame)

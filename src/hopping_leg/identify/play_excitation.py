@@ -90,16 +90,16 @@ def recording_of(
     """Return the part of a run's trace in which the excitation was played.
 
     Each row holds what the drives reported when the command of the row was computed; ticks without
-    a reply have no measurement. The base height is there if a rig that moves was measured, without
-    a long gap. The joint PD runs on the host, once per row; ``believed`` is the robot file that the
+    a reply have no measurement. A moving base's height is there if it was measured without long
+    gaps. The joint PD runs on the host, once per row; ``believed`` is the robot file that the
     recording is filed under. RecordingError says that it was not played.
     """
     columns = (*MEASURED, *TARGETS, "height_m")
     lacking = [column for column in columns if column not in trace.table.columns]
     if lacking:
         raise RecordingError(f"{name} has no column '{lacking[0]}'; no excitation was played.")
-    table = trace.table.with_columns(interpolated("height_m"))
-    table = table.filter(pl.col(TARGETS[0]).is_finite())
+    played = pl.col(TARGETS[0]).is_finite()
+    table = trace.table.with_columns(interpolated("height_m")).filter(played)
     if not table.height:
         raise RecordingError(f"{name} ended before the excitation began; see its events.")
     first = float(table["time_s"][0])
