@@ -5,7 +5,6 @@ keep. A latency of commands in ``[reality]`` is left to the wire, as drives act 
 without it.
 """
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -50,7 +49,6 @@ class EmulatedLeg:
         )
         self._legs.reseed(np.random.default_rng(seed))
         self._legs.stand(slice(None), np.asarray(q, np.float64))
-        self._links = (robot.thigh.length, robot.shank.length, robot.foot.radius)
 
     @property
     def height(self) -> float:
@@ -65,10 +63,7 @@ class EmulatedLeg:
     @property
     def foot_clearance(self) -> float:
         """Gap between foot and ground, m."""
-        hip, knee = float(self._legs.q[0, 0]), float(self._legs.q[0, 1])
-        thigh, shank, foot = self._links
-        down = thigh * math.cos(hip) + shank * math.cos(hip + knee)
-        return self.height - down - foot
+        return float(self._legs.foot_clearance()[0])
 
     @property
     def q(self) -> Array:
