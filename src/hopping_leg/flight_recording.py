@@ -145,7 +145,7 @@ def read_recording(path: Path) -> tuple[FlightRecorderTail, Array]:
 def recover(path: Path) -> trace.Trace:
     """Return the common trace of a run from its flight recording.
 
-    What hardware does not know of the base holds NaN.
+    Columns that a trace may rely on and the recording lacks hold NaN.
 
     Raises:
         TraceError: The file is missing, no flight recording, or holds no tick.
@@ -153,8 +153,7 @@ def recover(path: Path) -> trace.Trace:
     box, rows = read_recording(path)
     if not len(rows):
         raise errors.TraceError(f"{path} holds no tick; the run had not begun.")
-    heights = [name for name in trace.COLUMNS if "height" in name or "clearance" in name]
-    missing = [name for name in heights if name not in box.columns]
+    missing = [name for name in trace.COLUMNS if name not in box.columns]
     table = pl.DataFrame(dict(zip(box.columns, rows.T, strict=True))).with_columns(
         pl.lit(float("nan")).alias(name) for name in missing
     )
