@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import polars as pl
@@ -10,8 +11,10 @@ import pytest
 from hopping_leg.cli import FAILED, main
 from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.play_excitation import play
+from hopping_leg.identify.result import save_robot
 from hopping_leg.robot import load_robot
-from tests.identify.fitting import TRUTH, TWIN, run
+from tests.cli.emulated import put_behind
+from tests.identify.fitting import TRUTH, TWIN, identified, run
 from tests.identify.runs import SIDECAR, write_run
 from tests.identify.twin import swing
 
@@ -80,6 +83,27 @@ def test_a_fit_that_is_worse_than_its_start_fails_and_every_file_says_so(
     said = capsys.readouterr()
     assert said.out.index("do not use it") < said.out.index("95 % interval")
     assert "do not use it" in said.err
+
+
+def test_a_run_on_an_emulated_leg_is_compared_with_what_was_predicted_of_it(
+    recordings, tmp_path, monkeypatch, capsys, refused
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("hopping_leg.evaluate.trials.FIXED_SECONDS", 4.0)
+    words = ["--parameters", ",".join(TRUTH), "--posterior", 20, "--json", "leg.json"]
+    assert call(tmp_path, recordings[0], *words) == 0
+    save_robot(identified(), Path("real.toml"), "legv2")
+    put_behind(monkeypatch, robot="real.toml")
+    predict = "evaluate energy-shaping --robot leg.toml --posterior leg.json --json predicted.json"
+    deploy = "deploy energy-shaping --robot leg.toml --transport x --command 0.3 --seconds 4 --yes"
+    assert main(predict.split()) == main(deploy.split()) == 0
+    (trace,) = map(str, Path("runs/deploy").glob("*.parquet"))
+    assert main(["report", trace, "--prediction", "predicted.json"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "Reality is within what was predicted: median_estimated_apex_m is in its" in said
+    assert "Warning" not in said
+    refused(["report", trace, "--prediction", "leg.json"], "has no predictions")
+    refused(["evaluate", "fast", "--posterior", "leg.json"], "is not of legv2-identified")
 
 
 def test_warnings_of_recordings_are_shown(tmp_path, capsys):

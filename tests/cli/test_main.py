@@ -18,6 +18,7 @@ from hopping_leg.cli import main
 from hopping_leg.cli.options import Heights
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot, load_tree, numbers, shipped_robots
+from tests.doc_pages import ROOT
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,19 @@ def test_show_gives_every_number_with_unit_and_source(capsys, name):
     assert load_robot(name).digest in shown
     assert main(["robots", "list"]) == 0
     assert name in capsys.readouterr().out
+
+
+def test_an_imported_leg_is_checked_and_what_was_assumed_is_listed(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["robots", "import", str(ROOT / "examples/leg.urdf"), "--out", "a leg.toml"]
+    words += ["--motor", "ak80-9", "ak80-6", "--set", "knee.belt_ratio=1.5"]
+    assert main(words) == main(["robots", "check", "a leg.toml"]) == 0
+    said = capsys.readouterr().out
+    assert "hip = -hip_pitch" in said
+    assert said.count("rail.friction") == 1
+    assert "knee.belt_ratio" not in said
+    assert "valid robot: heron" in said
+    assert "assumed: unknown until identified" in (tmp_path / "a leg.toml").read_text()
 
 
 def test_urdf_is_written_to_a_file_or_printed(tmp_path, capsys):

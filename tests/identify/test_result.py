@@ -5,8 +5,10 @@ import tomllib
 import numpy as np
 import pytest
 
+from hopping_leg.errors import UsageError
 from hopping_leg.identify.report import write_fit_report
-from hopping_leg.identify.result import as_json, save_robot, shown_errors
+from hopping_leg.identify.result import as_json, posterior_robots, save_robot, shown_errors
+from hopping_leg.io import write_json
 from hopping_leg.robot import check_physics, load_robot, load_tree
 from tests.identify.fitting import TRUTH, identified, run
 
@@ -129,6 +131,19 @@ def test_a_delay_that_was_found_is_one_that_training_has(tmp_path, delay, latenc
     assert robot.reality.latency.command == latency
     assert robot.reality.only_delays
     assert ("reality" in tomllib.loads(path.read_text())) == (delay > 0)
+
+
+def test_draws_become_legs_whose_delay_is_their_latency_without_the_drives(tmp_path):
+    file, tree, robot = tmp_path / "leg.json", as_json(identified(), 3), identified().robot
+    tree["posterior"]["names"] = ["drive.delay", "drive.creep"]
+    write_json(file, tree)
+    legs = posterior_robots(file, robot)
+    delays = [delay for delay, _ in tree["posterior"]["samples"]]
+    assert [leg.reality.latency.command for leg in legs] == delays
+    assert {dataclasses.replace(leg, reality=robot.reality) for leg in legs} == {robot}
+    write_json(file, {**tree, "posterior": {"names": [], "samples": []}})
+    with pytest.raises(UsageError, match="no whole draws"):
+        posterior_robots(file, robot)
 
 
 def test_the_page_holds_every_part_needs_nothing_and_is_the_same_again():

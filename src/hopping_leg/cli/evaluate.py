@@ -14,6 +14,7 @@ Examples:
   hop evaluate 'runs/*/policy.onnx' --commands 0.25 0.30 --json result.json
   hop evaluate energy-shaping --robot my_leg.toml --seeds 20 --floor stiff
   hop evaluate fast energy-shaping --suite robustness --axes payload delay
+  hop evaluate fast --robot leg.toml --posterior leg.json --json prediction.json
 """
 
 from collections.abc import Sequence
@@ -45,7 +46,10 @@ class Evaluate:
     commands: options.Heights | None = None
     """Apex heights, m; default 0.25,0.30,0.35, scaled to the leg's length."""
     seeds: int = 5
-    """Realisations of noise and delay per trial."""
+    """Realisations of noise and delay per trial; with --posterior one for each of its draws."""
+    posterior: Path | None = None
+    """JSON of `hop identify --posterior N`, with the suite paper: predict what the real leg does, for
+    `hop report --prediction`, from fixed trials of every leg that was drawn."""
     seed: int = 1000
     """Seed of noise and delay; choose one that selected no policy."""
     json: options.JsonFile = None
@@ -103,12 +107,14 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
 def _paper(
     args: Evaluate, entries: "list[Entry]", setup: "RolloutConfig", notes: Sequence[str]
 ) -> None:
-    from hopping_leg.evaluate import tables, trials
+    from hopping_leg.evaluate import prediction, tables, trials
 
     judged = _judge(entries, setup, args)
     notes = [*notes, *judged.evaluation.notes]
     evaluation = replace(judged.evaluation, command=COMMAND.get(), notes=notes)
     tables.print_evaluation(plain_console(), evaluation)
+    if predictions := evaluation.predictions:
+        options.show_table(*prediction.shown(predictions))
     numbers, report, traces = args.json, None, args.traces
     if args.out is not None:
         numbers, traces = numbers or args.out / "evaluation.json", traces or args.out / "traces"
@@ -128,8 +134,10 @@ def _paper(
 
 def _judge(entries: "list[Entry]", setup: "RolloutConfig", args: Evaluate) -> "EvaluationRun":
     from hopping_leg.evaluate import evaluate, trials
+    from hopping_leg.identify.result import posterior_robots
 
-    floors = ("soft", "stiff") if args.floor == "both" else (args.floor,)
+    legs = posterior_robots(args.posterior, setup.robot) if args.posterior else ()
+    floors = ("soft", "stiff")[: 1 if legs else 2] if args.floor == "both" else (args.floor,)
     with Progress(parts=len(entries) * len(floors)) as bar:
         judged = [
             evaluate(
@@ -139,7 +147,8 @@ def _judge(entries: "list[Entry]", setup: "RolloutConfig", args: Evaluate) -> "E
                 repeats=args.seeds,
                 seed=args.seed,
                 floor=floor,
-                kinds=trials.KINDS if floor == "soft" or args.floor != "both" else ("fixed",),
+                kinds=("fixed",) if legs or floor != floors[0] else trials.KINDS,
+                robots=legs,
                 on_progress=partial(bar.show, about=f", {floor} floor"),
             )
             for floor in floors

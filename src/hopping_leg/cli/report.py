@@ -3,6 +3,7 @@
 Examples:
   hop report runs/first/traces/*.parquet --out runs/first/figures
   hop report runs/first/traces/*-fixed-*.parquet --format pdf
+  hop report runs/deploy/*.parquet --prediction prediction.json
 """
 
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from typing import Literal
 import tyro
 
 from hopping_leg import errors, io
-from hopping_leg.cli.options import say
+from hopping_leg.cli.options import say, show_table
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,8 @@ class Report:
     """Folder for the figures."""
     format: Literal["svg", "pdf", "png"] = "svg"
     """Kind of file."""
+    prediction: Path | None = None
+    """JSON of `hop evaluate --posterior`: say whether the traces are within what it predicts."""
 
 
 def run(args: Report) -> None:
@@ -33,13 +36,17 @@ def run(args: Report) -> None:
     if not args.traces:
         raise errors.UsageError("No trace was named; record some with `hop evaluate --out DIR`.")
     from hopping_leg import flight_recording
-    from hopping_leg.evaluate import report, result, trials
+    from hopping_leg.evaluate import prediction, report, result, trials
     from hopping_leg.figures import encode
 
     for path in args.traces:
         if path.suffix == flight_recording.SUFFIX:
             flight_recording.recover(path).save(path.with_suffix(".parquet"))
     runs = [trials.load_run(path) for path in args.traces]
+    if args.prediction:
+        compared, sentences = prediction.compare(args.prediction, runs)
+        show_table(*prediction.shown(compared))
+        say(*sentences)
     evaluation = result.tabulate(runs, seed=0)
     for name, figure in report.draw_report_figures(evaluation, runs).items():
         path = args.out / f"{name}.{args.format}"

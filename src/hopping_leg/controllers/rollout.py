@@ -183,6 +183,7 @@ def rollout(
         "robot": config.robot.name,
         "robot_digest": config.robot.digest,
         "controller": controller.name,
+        "policy_digest": getattr(controller, "digest", None),
         "seed": seed,
         "rate_hz": config.rate,
         "timestep_s": config.timestep,

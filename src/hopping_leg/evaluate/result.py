@@ -11,6 +11,7 @@ import polars as pl
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate import metrics, statistics
 from hopping_leg.evaluate.motor_load import MotorLoad, motor_load, unknown
+from hopping_leg.evaluate.prediction import Prediction
 from hopping_leg.evaluate.trials import Run
 from hopping_leg.io import plain
 from hopping_leg.robot import Robot
@@ -117,6 +118,8 @@ class Evaluation:
     distributions: list[dict[str, Any]]
     """Apexes behind ``summary``: controller, command_m, apexes_m."""
     estimators: list[metrics.Estimator] = field(default_factory=list)
+    predictions: list[Prediction] = field(default_factory=list)
+    """What the legs do that an identification allows, if they were what hopped."""
     groups: list[Group] = field(default_factory=list)
     conditions: dict[str, Any] = field(default_factory=dict)
     """Robot, digest, floor, disturbance, seeds, steps, rates."""

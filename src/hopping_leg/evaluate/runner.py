@@ -14,7 +14,7 @@ from hopping_leg.controllers import Controller, RolloutConfig
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller, shipped_policies
 from hopping_leg.errors import PolicyError, UsageError
-from hopping_leg.evaluate import motor_load, result, trials
+from hopping_leg.evaluate import motor_load, prediction, result, trials
 from hopping_leg.io import versions
 from hopping_leg.robot import JOINTS, TIMESTEP, Robot, braking_times
 from hopping_leg.sim import NO_NOISE
@@ -136,6 +136,7 @@ def evaluate(
     seed: int = 1000,
     floor: str = "soft",
     kinds: Collection[str] = trials.KINDS,
+    robots: Sequence[Robot] = (),
     on_progress: Callable[[str, float], None] = lambda _label, _share: None,
 ) -> EvaluationRun:
     """Run all trials of all entries and measure them.
@@ -148,12 +149,15 @@ def evaluate(
         seed: All of them follow from it.
         floor: One of ``FLOORS``.
         kinds: Which kinds of trial to run.
+        robots: What the leg may be, whatever controllers believe: each hops once in every trial,
+            in place of ``repeats``, which predicts how a leg hops.
         on_progress: Called with a label and the share done of its runs.
 
     Raises:
         UsageError: A command is out of reach or out of an entry's range, a name is taken twice,
             or there is nothing to do.
     """
+    repeats = len(robots) or repeats
     heights = trials.choose_commands(setup.robot, commands, repeats)
     check_entries(entries, heights if commands is not None else ())
     for entry in entries:
@@ -166,6 +170,7 @@ def evaluate(
         fitting = [t for t in planned if entry.reaches(height for height, _ in t.steps)]
         own = trials.run_trials(
             entry.label, entry.controller, world, fitting, repeats=repeats, seed=seed,
+            robots=[trials.floor_robot(robot, floor) for robot in robots],
             on_progress=functools.partial(on_progress, entry.label),
         )  # fmt: skip
         notes += entry.notes
@@ -191,6 +196,7 @@ def evaluate(
         "seeds": repeats,
     }
     told = replace(measured, groups=groups, notes=notes, conditions=conditions)
+    told = replace(told, predictions=prediction.predict(runs) if robots else [])
     return EvaluationRun(replace(told, versions=software_versions()), runs)
 
 

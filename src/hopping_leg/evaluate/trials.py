@@ -14,6 +14,7 @@ from hopping_leg.evaluate.metrics import stretches
 from hopping_leg.flight_recording import load_trace
 from hopping_leg.robot import GroundMismatch, Robot, command_limits
 from hopping_leg.robot.parameters import Contact
+from hopping_leg.sim import LegSimulator
 from hopping_leg.trace import Trace, interpolated
 
 COMMANDS = (0.25, 0.30, 0.35)
@@ -126,12 +127,13 @@ def run_trials(
     *,
     repeats: int,
     seed: int,
+    robots: Sequence[Robot] = (),
     on_progress: Callable[[float], None] = lambda _share: None,
 ) -> list[Run]:
     """Record all trials of one controller; those of equal length run as one batch.
 
-    Each has so many realisations of noise and delay, which follow from the seed. ``on_progress``
-    is called with the share done.
+    Each has so many realisations of noise and delay, which follow from the seed, each on the robot
+    of its number if there are some. ``on_progress`` is called with the share done.
     """
     total, done = sum(trial.seconds for trial in trials), 0.0
     runs: list[Run] = []
@@ -145,7 +147,11 @@ def run_trials(
         legs = [(trial, repeat) for trial in batch for repeat in range(repeats)]
         commands = np.stack([trial.commands(setup.rate) for trial, _ in legs], axis=1)
         noise = np.random.SeedSequence([seed, round(1000 * seconds)]).generate_state(1)
-        record = rollout(controller, setup, commands, int(noise[0]), on_tick)
+        world = LegSimulator(
+            setup.robot, len(legs), rate=setup.rate, timestep=setup.timestep,
+            threads=setup.threads, robots=[robots[repeat] for _, repeat in legs if robots],
+        )  # fmt: skip
+        record = rollout(controller, setup, commands, int(noise[0]), on_tick, legs=world)
         for leg, (trial, repeat) in enumerate(legs):
             header = {"trial": trial.name, "kind": trial.kind, "repeat": repeat, "seed": seed}
             trace = record.trace(leg, controller=label, **header)

@@ -2,21 +2,24 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hopping_leg.arrays import Array
+from hopping_leg.errors import UsageError
 from hopping_leg.identify import optimizers, recording_format
 from hopping_leg.identify.identifiability import Identifiability
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import FitPlan
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.validation import Validation
-from hopping_leg.io import plain, replace_at, versions, write_atomically
+from hopping_leg.io import parse_json, plain, replace_at, versions, write_atomically
 from hopping_leg.robot import COARSE_TIMESTEP, JOINTS, Robot, load_tree, robot_from_tree, robot_text
+from hopping_leg.robot.model_mismatch import NO_MISMATCH
+from hopping_leg.robot.robot_checks import check_physics
 
 _DELAY, _LATENCY = "drive.delay", "reality.latency.command"
 _WORSE = 1.01
@@ -257,6 +260,29 @@ def save_robot(identified: Identified, path: Path, origin: str | Path) -> None:
             tree = replace_at(tree, _LATENCY if delays else row["name"], entry)
     robot_from_tree(tree, str(path))
     write_atomically(path, robot_text(tree, _comment(identified, str(origin))).encode())
+
+
+def posterior_robots(path: Path, robot: Robot) -> tuple[Robot, ...]:
+    """Return what an identification's draws, stored as JSON, make of the robot that it wrote.
+
+    Raises:
+        UsageError: The file is none such, has no draws or is of another robot.
+        RobotError: A draw contradicts the robot.
+    """
+    tree, robots = parse_json(path.read_bytes(), str(path)), list[Robot]()
+    if not replace(robot, reality=NO_MISMATCH).has_digest(tree.get("robot_digest", "")):
+        raise UsageError(f"{path} is not of {robot.name}; give --robot what `hop identify` wrote.")
+    try:
+        for row in tree["posterior"]["samples"]:
+            drawn = dict(zip(tree["posterior"]["names"], row, strict=True))
+            own = {n: v for n, v in drawn.items() if not n.startswith("drive.")}
+            own |= {_LATENCY: drawn[_DELAY]} if _DELAY in drawn else {}
+            robots.append(LegHypothesis(robot).replace(own).robot)
+            check_physics(robots[-1], f"{path}: draw {len(robots)}")
+        return (robots[0], *robots[1:])
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        sentence = f"{path} has no whole draws; make some: `hop identify --posterior 100`."
+        raise UsageError(sentence) from error
 
 
 def provenance(identified: Identified) -> list[str]:

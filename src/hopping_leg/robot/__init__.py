@@ -16,6 +16,7 @@ from hopping_leg.robot.model import (
     build_model,
     compile_spec,
     get_spec,
+    to_urdf,
 )
 from hopping_leg.robot.model_mismatch import (
     NO_MISMATCH,
@@ -37,7 +38,6 @@ from hopping_leg.robot.robot_files import (
     robot_tree,
     shipped_robots,
 )
-from hopping_leg.robot.urdf import to_urdf
 
 __all__ = [
     "COARSE_TIMESTEP",

@@ -1,6 +1,7 @@
-"""The leg as a MuJoCo model: geometry from leg.xml, physics from a robot's parameters."""
+"""The leg as a MuJoCo model and as URDF: geometry from a file, physics from parameters."""
 
 from importlib import resources
+from xml.sax.saxutils import quoteattr
 
 import mujoco
 import numpy as np
@@ -142,3 +143,16 @@ def _add_motor(spec: mujoco.MjSpec, name: str, joint: Joint) -> None:
     actuator.gear[0] = joint.belt_ratio
     actuator.ctrllimited = True
     actuator.ctrlrange = [-limit, limit]
+
+
+def to_urdf(robot: Robot) -> str:
+    """Return the leg as URDF: rail (passive), hip, knee, and a fixed frame ``foot``.
+
+    The world's z is up, positive angles swing the foot to +x, zero is the straight leg downwards.
+    URDF knows neither a motor's reflected inertia, which stands in a comment at each joint, nor its
+    torque-speed limit: a joint's ``velocity`` is the speed at which its motor has no torque left.
+    Its ``limit`` are the mechanical stops. All is at the joint's side of the belt.
+    """
+    text = (resources.files("hopping_leg.robot") / "leg.urdf").read_text(encoding="utf-8")
+    half = {f"half_{name}": getattr(robot, name).length / 2 for name in ("thigh", "shank")}
+    return text.format(robot=robot, name=quoteattr(robot.name), **half)
