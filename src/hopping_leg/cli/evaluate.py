@@ -48,8 +48,8 @@ class Evaluate:
     seeds: int = 5
     """Realisations of noise and delay per trial; with --posterior one for each of its draws."""
     posterior: Path | None = None
-    """JSON of `hop identify --posterior N`, with the suite paper: predict what the real leg does, for
-    `hop report --prediction`, from fixed trials of every leg that was drawn."""
+    """JSON of `hop identify --posterior N`, with the suite paper: predict what the real leg does,
+    for `hop report --prediction`, from fixed trials of every leg that was drawn."""
     seed: int = 1000
     """Seed of noise and delay; choose one that selected no policy."""
     json: options.JsonFile = None
