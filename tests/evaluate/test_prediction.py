@@ -60,8 +60,10 @@ def test_nine_of_ten_later_runs_are_covered_and_one_that_differs_is_told(tmp_pat
     assert 0.8 < np.mean([p.holds for p in rows if p.quantity == "median_apex_m"]) < 1
     trace = runs[0].trace
     high = trace.table.with_columns(pl.col("height_m") + 0.05)
-    strange = replace(trace, table=high, header={**trace.header, "robot_digest": "other"})
-    *warnings, verdict = compare(file, [replace(runs[0], trace=strange, controller="mine")])[1]
+    strange = replace(
+        trace, table=high, header=trace.header | {"controller": "a", "robot_digest": "b"}
+    )
+    *warnings, verdict = compare(file, [replace(runs[0], trace=strange)])[1]
     assert [warning.split()[1] for warning in warnings] == ["controller", "robot_digest"]
     assert "is not within what was predicted: median_apex_m" in verdict
     assert "at 0 of 1 commands, and 0% of" in verdict

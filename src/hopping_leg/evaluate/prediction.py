@@ -1,7 +1,7 @@
 """What the legs that an identification allows do, as 90 % intervals, and later runs beside them.
 
-Hardware does not know its height: a controller's estimate of its apexes is predicted, too, so that
-like is compared with like, and so is what joints alone tell.
+Hardware may not measure its height: a controller's estimate of its apexes is predicted, too, so
+that like is compared with like, and so is what joints alone tell.
 """
 
 from collections.abc import Sequence
@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import polars as pl
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
@@ -103,15 +102,14 @@ def observe(window: metrics.HopWindow) -> dict[str, Array]:
 def _values(runs: Sequence[Run]) -> dict[tuple[Any, ...], Array]:
     """Return all that runs tell, by the first five fields of a ``Prediction``.
 
-    Of a run on hardware only the part counts in which its controller hops.
+    Of a run on hardware only the part counts in which its controller acts.
     """
     found: dict[tuple[Any, ...], list[Array]] = {}
     for run in runs:
-        trace, header = run.trace, run.trace.header
-        codes = header.get("codes", {}).get("part", {})
-        if hop := [float(code) for code, name in codes.items() if name == "hop"]:
-            trace = Trace(trace.table.filter(pl.col("part").is_in(hop)), header)
-        who = (run.controller, header.get("policy_digest"), header.get("robot_digest"))
+        header, acting = run.trace.header, np.isfinite(run.trace.column("hip_command_nm"))
+        trace = Trace(run.trace.table.filter(acting), header)
+        digests = (header.get("policy_digest"), header.get("robot_digest"))
+        who = (header.get("controller", run.controller), *digests)
         for window in metrics.measure(trace) if len(trace.table) > 1 else ():
             if window.settled >= _LEAST_SECONDS:
                 for name, values in observe(window).items():
