@@ -89,8 +89,8 @@ def test_no_method_but_the_truth_trains_on_what_the_twin_alone_knows(tmp_path):
     assert recipes["cad"].task.randomised == ()
     assert recipes["randomised"].task.randomised == IDENTIFIABLE_RANGES
     truth = simulated(sources["truth"])
-    assert truth.reality.only_delays
-    assert not twin.robot.reality.only_delays
+    assert truth.reality == truth.reality.in_training
+    assert twin.robot.reality != twin.robot.reality.in_training
     assert truth.reality.latency.command == twin.robot.reality.latency.command
     assert disturbance_of(twin.robot) == NO_NOISE
     assert disturbance_of(load_robot("legv2")).torque_noise > 0

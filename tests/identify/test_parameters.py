@@ -6,6 +6,8 @@ from hopping_leg.identify.cost import Scoring
 from hopping_leg.identify.identifiability import identifiability
 from hopping_leg.identify.optimizers import jacobian
 from hopping_leg.identify.parameters import choose
+from hopping_leg.robot import COARSE_TIMESTEP
+from hopping_leg.sim.leg_table import stiffest
 from tests.identify.searches import CAD, RUN, TRUTH, TWO, objective
 from tests.identify.twin import changed, record, swing
 
@@ -21,6 +23,22 @@ from tests.identify.twin import changed, record, swing
 def test_parameters_that_make_no_sense_get_a_sentence(names, sentence):
     with pytest.raises(UsageError, match=sentence):
         choose(CAD, names)
+
+
+def test_a_stiffness_is_searched_in_shares_and_stays_one_that_can_be_simulated():
+    name = "reality.knee.stiffness"
+    with pytest.raises(UsageError, match="no value to start from"):
+        choose(CAD, [name])
+    both = choose(CAD, [name, "hip.friction"], start={name: 400.0}, bounds={name: (0.0, 1e4)})
+    values = np.array([[100.0, 0.1], [400.0, 0.2], [1600.0, 0.3]])
+    vectors = both.vector(values)
+    np.testing.assert_allclose(both.values(vectors), values, rtol=1e-12)
+    assert vectors[2, 0] == pytest.approx(-vectors[0, 0])
+    step = 1e-6 * np.eye(2)
+    slopes = [(both.values(v + step) - both.values(v)).diagonal() / 1e-6 for v in vectors]
+    np.testing.assert_allclose([both.scale_at(v) for v in vectors], slopes, rtol=1e-4)
+    stiff = both.hypotheses(both.vector(np.array([[1e4, 0.1]])))[0]
+    assert stiff.get(name) == stiffest(CAD.robot, "knee", COARSE_TIMESTEP) < 1e4
 
 
 def test_only_the_sum_of_armature_and_inertia_is_identifiable():

@@ -9,14 +9,15 @@ import pytest
 from hopping_leg.errors import PhysicsError, RecordingError, RobotError
 from hopping_leg.identify import pipeline
 from hopping_leg.identify.optimizers import Found, Pass
-from hopping_leg.identify.parameters import LegHypothesis
+from hopping_leg.identify.parameters import LegHypothesis, parameter_units
 from hopping_leg.identify.pipeline import identify
 from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.recording_format import PAIRS
-from hopping_leg.identify.result import as_json
-from hopping_leg.robot import check_physics, load_robot
+from hopping_leg.identify.result import as_json, save_robot
+from hopping_leg.io import replace_at
+from hopping_leg.robot import check_physics, load_robot, robot_text
 from tests.identify.fitting import EFFORT, RATE, TRUTH, TWIN, identified, options, run
-from tests.identify.twin import LEG, changed, record, swing, tracked
+from tests.identify.twin import BELT, LEG, changed, hops, record, swing, tracked
 
 STEPS_APART = 5e-4
 """What twins that were recorded in larger physics steps than the plan's differ by, rad."""
@@ -39,6 +40,27 @@ def test_recordings_to_judge_by_replace_the_split_and_nobody_believes_a_reality(
     assert [r.name for r in found.fit] == [run().name]
     assert [r.name for r in found.held] == [run(1.0).name]
     assert found.robot.reality.neutral
+
+
+def test_a_belt_is_found_from_a_far_start_and_what_is_stated_of_it_stays(tmp_path):
+    stated, file = BELT | {"reality.knee.stiffness": 900.0}, tmp_path / "stated.toml"
+    tree = {"name": "stated", "extends": "legv2"}
+    for name, value in (stated | {"reality.latency.jitter": 1e-3}).items():
+        unit = parameter_units()[name]
+        tree = replace_at(tree, name, {"value": value, "unit": unit, "source": "guessed"})
+    file.write_text(robot_text(tree))
+    runs = [hops(LegHypothesis(LEG).replace(BELT).robot, 6.0)]
+    names = ("knee.friction", "reality.knee.stiffness")
+    found = identify(runs, load_robot(file), options=options(parameters=names))
+    assert found.start.get(names[1]) == 900.0
+    assert [one.name for one in found.passes] == ["rigid", "elastic"]
+    assert found.passes[1].found.cost < found.passes[0].found.cost
+    assert found.hypothesis.get(names[1]) == pytest.approx(300.0, rel=0.3)
+    save_robot(found, tmp_path / "mine.toml", file)
+    reality = load_robot(tmp_path / "mine.toml").reality
+    assert reality.knee == found.robot.reality.knee
+    assert reality.knee.stiffness_damping == 0.03
+    assert reality.latency.jitter == 0
 
 
 def test_each_rig_is_judged_for_itself():
@@ -107,6 +129,7 @@ def test_a_motor_is_never_found_weaker_than_its_own_limit(joint):
 
 FIXED = record(LEG, swing(1.0))
 STANDING = record(LEG, swing(1.0, "rail"), "rail")
+SPARSE = STANDING.with_metadata(rate_hz=100.0)
 TORQUES = record(LEG, swing(1.0), onboard="torque")
 
 
@@ -132,6 +155,9 @@ STRONG = {"stiffness": (800.0, 800.0), "damping": (0.0, 0.0)}
         ([FIXED, on("rail", "zoh")], "knee.load_friction", "drive.hip.damping"),
         ([FIXED], "hip.friction", "knee.load_friction"),
         ([on("rail")], "rail.friction", "knee.load_friction"),
+        ([FIXED, STANDING], "reality.knee.stiffness", "reality.hip.stiffness"),
+        ([FIXED], "hip.friction", "reality.knee.stiffness"),
+        ([SPARSE, FIXED], "rail.friction", "reality.knee.stiffness"),
     ],
 )
 def test_what_recordings_can_tell_is_fitted_and_what_is_known_is_kept(recordings, fitted, kept):

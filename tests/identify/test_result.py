@@ -129,7 +129,7 @@ def test_a_delay_that_was_found_is_one_that_training_has(tmp_path, delay, latenc
     save_robot(found_of("drive.delay", "s", delay), path, "legv2")
     robot = load_robot(path)
     assert robot.reality.latency.command == latency
-    assert robot.reality.only_delays
+    assert robot.reality == robot.reality.in_training
     assert ("reality" in tomllib.loads(path.read_text())) == (delay > 0)
 
 

@@ -6,7 +6,7 @@ from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import hold_out
 from hopping_leg.identify.simulate import WindowSimulator, cut
 from hopping_leg.identify.validation import validate
-from tests.identify.twin import LEG, STEP, changed, record, swing
+from tests.identify.twin import BELT, LEG, STEP, changed, hops, record, swing
 
 TRUE = LegHypothesis(LEG)
 FREE = TRUE.replace({"hip.friction": 0.0, "knee.friction": 0.0})
@@ -39,6 +39,16 @@ def test_windows_on_the_rail_start_with_the_speed_of_the_base():
     assert np.abs(np.gradient(run.trace.column("height_m"), 0.005)).max() > 0.3
     got = simulator([run], 0.1).run([TRUE]).position[0]
     assert np.abs(got - run.array("position").reshape(20, 20, 2)).max() < 3e-3
+
+
+@pytest.mark.parametrize(("rig", "error", "share"), [("fixed-base", 3e-4, 2), ("rail", 5e-3, 0.3)])
+def test_a_leg_with_a_belt_is_replayed_from_what_its_motors_show(rig, error, share):
+    belt, run = TRUE.replace(BELT), hops(TRUE.replace(BELT).robot, 2.0, rig)
+    got = WindowSimulator([run], cut([run], 0.2), timestep=STEP / 4).run([belt, TRUE])
+    errors = got.position - run.array("position").reshape(10, 40, 2)
+    own, rigid = np.sqrt(np.mean(errors**2, axis=(1, 2)))
+    assert (own < error).all()
+    assert (own < share * rigid).all()
 
 
 def test_a_candidate_does_not_depend_on_its_company_nor_on_threads():

@@ -7,6 +7,8 @@ import mujoco
 import numpy as np
 import polars as pl
 
+from hopping_leg.identify.excitation import Excitation
+from hopping_leg.identify.play_excitation import play
 from hopping_leg.identify.recording import make_recording
 from hopping_leg.identify.recording_format import PAIRS, RecordingMetadata
 from hopping_leg.robot import MotorLimit, compile_spec, get_spec, kinematics, load_robot
@@ -77,6 +79,18 @@ def record(robot, targets, rig="fixed-base", rate=200.0, onboard="zoh", name="tw
 def tracked():
     """Return the leg swinging for some seconds under its PD."""
     return record(LEG, swing(8.0))
+
+
+BELT = {"reality.knee.stiffness": 300.0, "reality.knee.stiffness_damping": 0.03}
+
+
+def hops(robot, seconds, rig="rail"):
+    """Play small hops, or their motion in the air, on a robot with its [reality]."""
+    time = np.arange(round(200 * seconds)) / 200
+    bend = 0.8 + 0.35 * np.cos(2 * np.pi * 2.2 * time)
+    targets = np.stack([bend, -2 * bend], axis=1)
+    excitation = Excitation(time, targets, 0 * targets, rig, 200.0, "legv2", "hops")
+    return play(excitation, robot, believed="legv2")
 
 
 def noisy(run, seed=0, **scales):

@@ -12,7 +12,9 @@ from hopping_leg.rl.run_folder import MISSED, RunFolder, missed_commands
 from hopping_leg.robot import load_robot, shipped_robots
 
 LEGS = [load_robot(name) for name in shipped_robots()]
-LEGS = [robot for robot in LEGS if robot.kind == "leg" and robot.reality.only_delays]
+LEGS = [
+    robot for robot in LEGS if robot.kind == "leg" and robot.reality == robot.reality.in_training
+]
 every_leg = pytest.mark.parametrize("robot", LEGS, ids=lambda robot: robot.name)
 
 

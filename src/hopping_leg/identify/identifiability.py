@@ -62,8 +62,9 @@ def identifiability(
         shift = covariance @ (jacobian.T @ change) / max(variance, 1e-300)
     half = _NINETY_FIVE * deviation + np.abs(shift)
     total = covariance + np.outer(shift, shift) / _NINETY_FIVE**2
-    wide = half / _NINETY_FIVE / np.sqrt(np.maximum(np.diag(total), 1e-300)) * parameters.scale
-    half = np.where(blind, np.inf, half * parameters.scale)
+    unit = parameters.scale_at(vector)
+    wide = half / _NINETY_FIVE / np.sqrt(np.maximum(np.diag(total), 1e-300)) * unit
+    half = np.where(blind, np.inf, half * unit)
     values = parameters.values(vector)
     low, high = parameters.bounds
     near = 1e-6 * (high - low)
@@ -107,7 +108,8 @@ def _statements(
     parameters: ParameterSet, values: Array, half: Array, correlation: Array, at_bound: list[bool]
 ) -> list[str]:
     said, names = [], parameters.names
-    sizes = np.maximum(np.abs(values), parameters.scale)  # a value near zero is known, too
+    least = np.where(parameters.shares, 0.0, parameters.scale)
+    sizes = np.maximum(np.abs(values), least)  # a value near zero is known, too
     for name, value, size, width, stuck in zip(names, values, sizes, half, at_bound, strict=True):
         if not np.isfinite(width):
             said.append(f"These data say nothing about '{name}'.")

@@ -22,6 +22,7 @@ from hopping_leg.identify.cost import Objective, RobustLoss
 from hopping_leg.identify.parameters import ParameterSet, choose
 from hopping_leg.identify.plan import FitPlan, pass_names
 from hopping_leg.identify.simulate import Window
+from hopping_leg.robot import NO_MISMATCH
 
 Evaluate = Callable[[Array], Array]
 """Search vectors (n, k) to costs (n,) or residuals (n, m), row by row independent."""
@@ -38,6 +39,8 @@ _SPREAD = 1.0  # first standard deviation of CMA-ES, in scales
 _CONVERGED = 1e-9  # range of a generation's costs, relative to its best, that ends CMA-ES
 _COLLAPSED = 1e-3  # standard deviation, in scales, below which a search by shares has ended
 _RECENT = 4  # generations whose best stand for election at the end of CMA-ES
+_FACTORS = (0.5, 1.1, 2.4)  # stiffnesses with which a search begins, over the usual one
+_NEAR = np.linspace(-0.4, 0.4, 9)  # logarithms of factors that are tried before each round
 _FACTOR = 2.0  # the paper's second pass keeps the first one's parameters within this factor
 
 
@@ -85,6 +88,12 @@ class Pass:
     name: str
     parameters: ParameterSet
     found: Found
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Where it ended, by name, SI."""
+        values = self.parameters.values(self.found.vector).tolist()
+        return dict(zip(self.parameters.names, values, strict=True))
 
 
 def jacobian(
@@ -160,7 +169,18 @@ def least_squares(
         still = np.zeros((len(loss.sizes), len(vector)))
         return np.concatenate([loss.weights(last)[:, None] * found, still])
 
+    def scanned(vector: Array) -> Array:
+        """Return the best of a vector and others that differ in a number searched in shares."""
+        for k in np.flatnonzero(parameters.shares):
+            near = vector[k] + _NEAR * parameters.start[k] / parameters.scale[k]
+            vectors = np.tile(vector, (1 + len(_NEAR), 1))
+            vectors[1:, k] = np.clip(near, low[k] + margin[k], high[k] - margin[k])
+            costs = [np.sum(loss.levelled(r) ** 2) for r in counted(vectors)]
+            vector = vectors[int(np.argmin(costs))]
+        return vector
+
     while len(history) < options.rounds:
+        vector = scanned(vector)
         result = optimize.least_squares(
             values, vector, slopes, (low, high), x_scale="jac", max_nfev=options.evaluations
         )
@@ -254,20 +274,39 @@ def search(
             found = cma_es(values, parameters, options, seed=seed, shares=shares, report=progress)
         return Pass(name, parameters, found)
 
+    every = plan.parameters
+    if plan.search == "least-squares" and every.shares.any():
+        return _elastic(every, run)
     if plan.search != "two-pass":
-        return [run(plan.search, plan.parameters)]
+        return [run(plan.search, every)]
     _, added = pass_names([r.metadata.rig for r in objective.recordings])
     kept = tuple(p for p in plan.parameters.parameters if p.name not in added)
     first = run("two-pass, first", replace(plan.parameters, parameters=kept), 0.0, 0.5)
     return [first, run("two-pass, second", second_pass(plan.parameters, first), 0.5, 0.5)]
 
 
+def _elastic(every: ParameterSet, run: Callable[..., Pass]) -> list[Pass]:
+    """Search with rigid transmissions, then all from there, at each of several stiffnesses.
+
+    The cost has minima at many stiffnesses, and none tells while all other numbers are far off.
+    """
+    rest = tuple(p for p in every.parameters if not p.name.startswith("reality."))
+    rigid = replace(every.base, robot=replace(every.base.robot, reality=NO_MISMATCH))
+    passes = [run("rigid", ParameterSet(rigid, rest), 0.0, 0.25)] if rest else []
+    bounds = {p.name: (p.low, p.high) for p in every.parameters}
+    start = passes[0].values if rest else {}
+    stiff, tried = [p for p in every.parameters if p.logarithmic], list[Pass]()
+    for factor in _FACTORS:
+        start |= {p.name: min(max(factor * p.start, p.low), p.high) for p in stiff}
+        chosen = choose(every.base, every.names, bounds=bounds, start=start)
+        tried.append(run("elastic", chosen, 0.25 * (1 + len(tried)), 0.25))
+    return [*passes, min(tried, key=lambda one: one.found.cost)]
+
+
 def second_pass(every: ParameterSet, first: Pass) -> ParameterSet:
     """Return every parameter; those of the first pass start from its end, and near it."""
-    starts, bounds = {}, {p.name: (p.low, p.high) for p in every.parameters}
-    values = first.parameters.values(first.found.vector).tolist()
-    for p, value in zip(first.parameters.parameters, values, strict=True):
-        starts[p.name] = value
+    starts, bounds = first.values, {p.name: (p.low, p.high) for p in every.parameters}
+    for p, value in zip(first.parameters.parameters, starts.values(), strict=True):
         if not p.name.startswith("drive."):
             reach = 0.1 * p.scale
             near = (value / _FACTOR, value * _FACTOR, value - reach, value + reach)

@@ -2,17 +2,21 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cache, cached_property
 from operator import attrgetter
 from typing import Any, get_type_hints
 
 import numpy as np
 
-from hopping_leg.arrays import Array
+from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.io import quantity, replace_at
-from hopping_leg.robot import COARSE_TIMESTEP, Robot
+from hopping_leg.robot import COARSE_TIMESTEP, JOINTS, Robot
+from hopping_leg.sim.leg_table import stiffest
+
+STIFFNESS = tuple(f"reality.{joint}.stiffness" for joint in JOINTS)
+"""Of the joints' transmissions, rigid where the robot states none."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +57,9 @@ class LegHypothesis:
     drive: Actuators = field(default_factory=Actuators)
 
     def get(self, name: str) -> float:
-        """Return a parameter's value, or raise UsageError if there is no such parameter."""
-        return float(attrgetter(self._path(name))(self))
+        """Return a parameter's value, NaN for none; UsageError if there is no such parameter."""
+        value = attrgetter(self._path(name))(self)
+        return math.nan if value is None else float(value)
 
     def replace(self, values: Mapping[str, float]) -> "LegHypothesis":
         """Return the hypothesis with other values of parameters; UsageError if one is unknown."""
@@ -104,8 +109,11 @@ _RANGES = {
     "torque_gain": (0.5, 1.5),
     "drive.sensor_gain": (0.5, 1.5),
     "load_friction": (0.0, 0.5),
+    "backlash": (0.0, 0.02),
+    "stiffness_damping": (0.0, 0.5),
 }
 """Widest bounds: by full name, else by the last part, prefixed by ``drive`` for drives."""
+_ROUGH = 10.0  # scale of a stiffness over it: the cost is so rough that slopes need 1 % of it
 _FACTOR = 4.0  # parameters without a range may lie between a quarter and four times their start
 
 
@@ -119,7 +127,9 @@ class Parameter:
     low: float
     high: float
     scale: float
-    """A change that matters; searches work in units of it."""
+    """A change that matters at the start; searches work in units of it."""
+    logarithmic: bool = False
+    """Whether searches work in shares of the value, which is positive."""
 
     def __post_init__(self) -> None:
         if not self.low <= self.start <= self.high or not self.low < self.high:
@@ -155,6 +165,16 @@ class ParameterSet:
         """Scales in order, (k,)."""
         return np.array([p.scale for p in self.parameters])
 
+    def scale_at(self, vector: Array) -> Array:
+        """Return by how much values change per unit of a search vector, (k,)."""
+        start = np.where(self.shares, self.start, 1.0)
+        return np.where(self.shares, self.values(vector) / start, 1.0) * self.scale
+
+    @cached_property
+    def shares(self) -> BoolArray:
+        """Which are searched in shares of their value, (k,)."""
+        return np.array([p.logarithmic for p in self.parameters])
+
     @cached_property
     def start(self) -> Array:
         """Starting values in order, (k,)."""
@@ -168,17 +188,22 @@ class ParameterSet:
 
     def values(self, vector: Array) -> Array:
         """Return physical values of search vectors, (..., k)."""
-        return np.asarray(self.start + vector * self.scale)
+        values, shares, start = self.start + vector * self.scale, self.shares, self.start
+        values[..., shares] = start[shares] * np.exp(values[..., shares] / start[shares] - 1)
+        return np.asarray(values)
 
     def vector(self, values: Array) -> Array:
         """Return the search vector of physical values, (..., k)."""
-        return np.asarray((values - self.start) / self.scale)
+        values, shares, start = np.array(values), self.shares, self.start
+        values[..., shares] = start[shares] * (1 + np.log(values[..., shares] / start[shares]))
+        return np.asarray((values - start) / self.scale)
 
     def hypotheses(self, vectors: Array) -> list[LegHypothesis]:
         """Return the hypotheses that search vectors stand for; ``vectors`` is (n, k)."""
         low, high = (self.values(b) for b in self.bounds)
         values = np.clip(self.values(vectors), low, high)
-        return [self.base.replace(dict(zip(self.names, row, strict=True))) for row in values]
+        rows = (dict(zip(self.names, row, strict=True)) for row in values)
+        return [_simulable(self.base.replace(row)) for row in rows]
 
 
 def choose(
@@ -201,8 +226,20 @@ def choose(
         low, high = (bounds or {}).get(name) or _widest_bounds(name, value)
         at_low = value == low == 0.0 or math.isclose(value, low, rel_tol=1e-12)
         scale = 0.02 * (high - low) if at_low else max(0.3 * abs(value), 1e-3 * (high - low))
-        parameters.append(Parameter(name, units[name], value, low, high, scale))
+        if shares := name in STIFFNESS:
+            low, scale = max(low, 1e-3 * value), _ROUGH * value
+        parameters.append(Parameter(name, units[name], value, low, high, scale, shares))
     return ParameterSet(base, tuple(parameters))
+
+
+def _simulable(hypothesis: LegHypothesis) -> LegHypothesis:
+    """Return a hypothesis with transmissions no stiffer than the physics step allows."""
+    robot = hypothesis.robot
+    for joint in JOINTS:
+        if (stiffness := getattr(robot.reality, joint).stiffness) is not None:
+            most = stiffest(robot, joint, COARSE_TIMESTEP)
+            robot = replace_at(robot, f"reality.{joint}.stiffness", min(stiffness, most))
+    return replace(hypothesis, robot=robot)
 
 
 def _widest_bounds(name: str, value: float) -> tuple[float, float]:

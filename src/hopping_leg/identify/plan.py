@@ -2,15 +2,16 @@
 
 import contextlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hopping_leg.errors import RecordingError, RobotError, UsageError, unknown_name
 from hopping_leg.identify import cost, initial_states, recording_format
-from hopping_leg.identify.parameters import LegHypothesis, ParameterSet, choose
+from hopping_leg.identify.parameters import STIFFNESS, LegHypothesis, ParameterSet, choose
 from hopping_leg.identify.recording import Recording
-from hopping_leg.robot import JOINTS, Robot, load_robot
+from hopping_leg.robot import COARSE_TIMESTEP, JOINTS, NO_MISMATCH, Robot, load_robot
+from hopping_leg.sim.leg_table import stiffest
 
 _TOLERANCE = 0.2  # share by which link lengths may differ between files of one leg
 
@@ -60,6 +61,10 @@ _SOLVER_PARAMETERS = ["contact.time_constant", "contact.damping_ratio"]
 """Table I; inertias and the contact's are fixed in the first pass."""
 _GAINS = {"stiffness": 10.0, "damping": 0.5, "integral": 1.0}
 """Where a search for an unknown gain begins, in the gain's unit at the joint."""
+_USUAL, _SOFTEST = 0.3, 0.02
+"""Stiffness of a transmission at first, and at least, over the stiffest that can be simulated."""
+_CREAK = 7e-5  # its damping at first, over that stiffness, s
+_DENSE = 200.0  # rows per second that show a transmission
 _OFTEN, _BEYOND = 0.8, 1.5  # share of the time, and factor, that tell a torque limit from a spike
 _FASTEST, _REACHED = 0.999, 0.8
 """Quantile that leaves spikes out, and share of it that a motor at least reaches by itself."""
@@ -99,9 +104,11 @@ def make_plan(
     if paper:  # Table I, and what is asked for besides
         first, second = pass_names(rigs)
         parameters = tuple(dict.fromkeys([*first, *second, *(parameters or gains)]))
-    start = LegHypothesis(robot).replace(_start(recordings, gains))
+    names = parameters or tuple(_names(recordings, gains))
+    believed = LegHypothesis(_without_reality(robot, names))
+    start = believed.replace(_start(recordings, gains) | _transmissions(believed, names))
     limits = _bounds(recordings, robot) | dict(bounds or {})
-    chosen = choose(start, parameters or _names(recordings, gains), bounds=limits)
+    chosen = choose(start, names, bounds=limits)
     for name in bounds or ():
         if name not in chosen.names:
             raise UsageError(unknown_name("fitted parameter", name, chosen.names))
@@ -125,6 +132,22 @@ def pass_names(rigs: Sequence[recording_format.Rig]) -> tuple[list[str], list[st
     return _JOINT_PARAMETERS + _RAIL_PARAMETERS, _INERTIAS + _SOLVER_PARAMETERS
 
 
+def _without_reality(robot: Robot, names: Sequence[str]) -> Robot:
+    """Return a robot without [reality], but for the transmission of a joint whose is fitted."""
+    fitted = (joint for joint in JOINTS if any(f"reality.{joint}." in name for name in names))
+    kept = {joint: getattr(robot.reality.in_training, joint) for joint in fitted}
+    return replace(robot, reality=replace(NO_MISMATCH, **kept))
+
+
+def _transmissions(believed: LegHypothesis, names: Sequence[str]) -> dict[str, float]:
+    """Return where numbers of transmissions begin that are fitted and that the robot lacks."""
+    found = dict[str, float]()
+    for joint, stiffness in zip(JOINTS, STIFFNESS, strict=True):
+        usual = _USUAL * stiffest(believed.robot, joint, COARSE_TIMESTEP)
+        found |= {stiffness: usual, f"{stiffness}_damping": _CREAK * usual}
+    return {k: value for k, value in found.items() if k in names and not believed.get(k) > 0}
+
+
 def _names(recordings: Sequence[Recording], gains: list[str]) -> list[str]:
     """Return what these recordings can tell, and drives' gains nobody knows."""
     first, second = pass_names([r.metadata.rig for r in recordings])
@@ -139,7 +162,15 @@ def _names(recordings: Sequence[Recording], gains: list[str]) -> list[str]:
         names += [f"{joint}.load_friction" for joint in JOINTS]
     if all(measured):
         names += [f"{joint}.torque_gain" for joint in JOINTS]
+    if grounded and np.logical_or(commanded, measured).all() and all(map(_shows_belt, recordings)):
+        names += [f"{STIFFNESS[1]}{end}" for end in ("", "_damping")]
     return [*names, *_limits(recordings), *gains]
+
+
+def _shows_belt(recording: Recording) -> bool:
+    """Return whether a recording is dense and full enough to tell a soft knee from soft ground."""
+    height = recording.metadata.rig == "fixed-base" or recording.has_column("height_m")
+    return height and recording.has("velocity") and recording.metadata.rate_hz >= _DENSE
 
 
 def _open_gains(recordings: Sequence[Recording]) -> list[str]:
@@ -190,6 +221,8 @@ def _bounds(recordings: Sequence[Recording], robot: Robot) -> dict[str, tuple[fl
     for name, joint, speed in zip(JOINTS, (robot.hip, robot.knee), speeds.T, strict=True):
         motor, seen = joint.motor, speed[np.isfinite(speed)]
         peak = max(motor.torque_limit, motor.rated_torque)
+        most = stiffest(robot, name, COARSE_TIMESTEP)
+        found[f"reality.{name}.stiffness"] = (_SOFTEST * most, most)
         found[f"{name}.motor.peak_torque"] = (peak, 4 * motor.peak_torque)
         least = _REACHED * joint.belt_ratio * float(np.quantile(seen, _FASTEST)) if len(seen) else 0
         known = motor.no_load_speed

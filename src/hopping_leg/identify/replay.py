@@ -17,7 +17,16 @@ import numpy as np
 from hopping_leg.arrays import Array, Record, Records
 from hopping_leg.sim.compiled import compiled, inlined
 from hopping_leg.sim.leg_physics import SCRATCH
-from hopping_leg.sim.stepper import MEMORY, asked, motor_torque, step_leg, step_leg_on_boom
+from hopping_leg.sim.stepper import (
+    MEMORY,
+    after_gear,
+    asked,
+    dry_friction,
+    motor_torque,
+    step_leg,
+    step_leg_on_boom,
+    through_transmission,
+)  # fmt: skip
 
 TORQUE, ZOH, CONTINUOUS = range(3)
 """What closes the loop: nothing, a PD once per row, the drives at every physics step."""
@@ -52,6 +61,7 @@ RESULT = 7
 
 _WILD = 1e4  # joint velocity beyond which a simulation has broken down, rad/s
 _SOON = 1e-9  # s, within which moments are the same
+_TRIALS = 6  # steps in which an elastic joint's link is moved to where it follows its motor
 
 
 @inlined
@@ -85,11 +95,17 @@ def _add(
 
 
 @inlined
-def _read(state: Array, memory: Record, dt: float, seen: Array) -> None:
-    """Set angles and speeds of one moment: the speeds go on for half a physics step."""
+def _read(p: Record, state: Array, memory: Record, dt: float, seen: Array) -> None:
+    """Set motors' angles and speeds of one moment: the speeds go on for half a physics step."""
     for joint in range(2):
-        seen[joint] = state[1 + joint]
-        seen[2 + joint] = state[4 + joint] + dt / 2 * memory.acceleration[1 + joint]
+        q, v, a = state[1 + joint], state[4 + joint], memory.acceleration[1 + joint]
+        if p.elastic[joint] > 0:
+            t, w, torque = memory.rotor[joint], memory.rotor[2 + joint], memory.motor_torque[joint]
+            loss = dry_friction(p, joint, torque, w)
+            torque = after_gear(p, joint, torque, t, w)
+            _, _, a = through_transmission(p, joint, torque, loss, q, v, t, w)
+            q, v = t, w
+        seen[joint], seen[2 + joint] = q, v + dt / 2 * a
 
 
 @compiled
@@ -134,7 +150,7 @@ def _replay_window(
     command = memory.command
     for n in range(length):
         now = rows[start + n].time
-        _read(state, memory, dt, seen)
+        _read(p, state, memory, dt if n > 0 else 0.0, seen)
         if not (abs(seen[2]) < _WILD and abs(seen[3]) < _WILD):
             result[: n + 1] = np.nan
             return
@@ -146,7 +162,8 @@ def _replay_window(
             steps = max(1, round((rows[start + n + 1].time - now) / timestep))
             even = (rows[start + n + 1].time - now) / steps
             dt = timestep if abs(even - timestep) < _SOON else even
-        step = -2 if n == 0 else -1  # at which the motors are only tried and measured
+        trials = _TRIALS if p.elastic[0] + p.elastic[1] > 0 else 1
+        step = -1 - trials if n == 0 else -1  # at which the motors are only tried and measured
         while step < steps:
             # Before ``since`` was sent what has arrived when this step's torque begins to act.
             since = now - delay + ((step - 0.5) * dt if step >= 0 else 0.0)
@@ -201,11 +218,22 @@ def _replay_window(
             else:
                 step_leg(p, where, memory, none, scratch, 0.0, many, dt)
             if step < 0:  # a state's speeds belong half a step before
+                for joint in range(2):
+                    w = seen[2 + joint]
+                    gain = (memory.rotor[2 + joint] - w) / dt
+                    memory.rotor[joint], memory.rotor[2 + joint] = seen[joint], w
+                    if step == -2:
+                        memory.rotor[2 + joint] -= dt / 2 * gain
+                    elif p.elastic[joint] > 0:
+                        ease = 1 / p.armature[joint] + p.joint_softness[joint]
+                        gain = memory.acceleration[1 + joint] - gain
+                        state[1 + joint] += gain / ease / p.belt_stiffness[joint]
+                if step < -2:
+                    step += 1
+                    continue
                 for i in range(3):
                     state[3 + i] -= dt / 2 * memory.acceleration[i]
-                memory.rotor[2], memory.rotor[3] = state[4], state[5]
-                memory.motor_torque[:] = 0
-            _read(state, memory, dt, seen)
+            _read(p, state, memory, dt, seen)
             step += many
 
 

@@ -19,7 +19,7 @@ from hopping_leg.identify.validation import Validation
 from hopping_leg.io import parse_json, plain, replace_at, versions, write_atomically
 from hopping_leg.robot import COARSE_TIMESTEP, JOINTS, Robot, load_tree, robot_from_tree, robot_text
 from hopping_leg.robot.model_mismatch import NO_MISMATCH
-from hopping_leg.robot.robot_checks import check_physics
+from hopping_leg.robot.robot_checks import check_physics, numbers
 
 _DELAY, _LATENCY = "drive.delay", "reality.latency.command"
 _WORSE = 1.01
@@ -250,7 +250,11 @@ def save_robot(identified: Identified, path: Path, origin: str | Path) -> None:
         RobotError: The identified values make no valid robot; nothing is written.
         TraceError: The file cannot be written.
     """
-    tree = {key: value for key, value in load_tree(origin).items() if key != "reality"}
+    stated = load_tree(origin)
+    tree = {key: value for key, value in stated.items() if key != "reality"}
+    for name, entry in numbers(stated.get("reality", {}), "reality."):
+        if identified.start.get(name) == entry["value"]:  # a transmission that the fit began with
+            tree = replace_at(tree, name, entry)
     tree["name"] = path.stem
     tree["description"] = f"{identified.start.robot.name}, identified from recordings"
     for row in parameters_json(identified):

@@ -162,6 +162,9 @@ class _WindowGroup:
             damping += legs["gain"] * own
         for joint, inertia in enumerate(("hip_inertia", "knee_inertia")):
             surplus = self._timestep / 2 * damping[:, joint]
+            elastic, armature = legs["elastic"][:, joint] > 0, legs["armature"][:, joint]
+            armature -= np.where(elastic, np.minimum(surplus, _SURPLUS * armature), 0.0)
+            surplus = np.where(elastic, 0.0, surplus)
             legs[inertia] -= np.minimum(surplus, _SURPLUS * legs[inertia])
         creep = np.array([h.drive.creep for h in hypotheses])[:, None]
         soft = legs["friction"] / np.maximum(creep, 1e-6) * self._timestep
@@ -172,9 +175,11 @@ class _WindowGroup:
         for n, recording in enumerate(self._recordings):
             if recording.metadata.torque_limit is not None:
                 table["torque_limit"][:, n] = recording.metadata.torque_limit
-            seen = recording.array("position")  # where a joint has been, nothing stops it
-            table["stop_lower"][:, n] = np.fmin(table["stop_lower"][:, n], np.nanmin(seen, axis=0))
-            table["stop_upper"][:, n] = np.fmax(table["stop_upper"][:, n], np.nanmax(seen, axis=0))
+            # Where a joint has been, nothing stops it, if its motor shows where it is.
+            seen = np.where(legs["elastic"][:, None] > 0, np.nan, recording.array("position"))
+            for stop, extreme in (("lower", np.fmin), ("upper", np.fmax)):
+                most = extreme.reduce(seen, axis=1)
+                table[f"stop_{stop}"][:, n] = extreme(table[f"stop_{stop}"][:, n], most)
         return table
 
     def _drives(self, hypotheses: Sequence[parameters.LegHypothesis]) -> Records:

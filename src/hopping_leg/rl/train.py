@@ -112,7 +112,7 @@ def train(
     """
     if minutes is not None and not 0 < minutes < float("inf"):
         raise errors.UsageError(f"--minutes is {minutes:g} but must be positive.")
-    if not robot.reality.only_delays:
+    if robot.reality != robot.reality.in_training:
         raise errors.RobotError(
             f"{robot.name} has effects in [reality] that training does not know; train on what is"
             " believed of it, the robot that its file extends or one from `hop identify`, and"

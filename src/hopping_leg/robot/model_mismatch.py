@@ -110,9 +110,18 @@ class ModelMismatch:
         return self == NO_MISMATCH
 
     @property
-    def only_delays(self) -> bool:
-        """Whether nothing but a constant delay of commands is left, which training can simulate."""
-        return self == replace(NO_MISMATCH, latency=Latency(command=self.latency.command))
+    def in_training(self) -> "ModelMismatch":
+        """What of it training simulates: transmissions, delay and jitter of commands."""
+        hip, knee = (
+            DriveMismatch(
+                backlash=drive.backlash,
+                stiffness=drive.stiffness,
+                stiffness_damping=drive.stiffness_damping,
+            )
+            for drive in (self.hip, self.knee)
+        )
+        latency = replace(self.latency, measurement=0.0)
+        return ModelMismatch(latency=latency, hip=hip, knee=knee)
 
     def of_drives(self, attribute: str) -> Array:
         """Return an attribute of both drives, (2,); NaN where it is None."""

@@ -24,6 +24,7 @@ from hopping_leg.robot import (
     numbers,
     robot_from_tree,
 )
+from hopping_leg.sim.leg_table import stiffest
 from hopping_leg.sim.randomization import Range, Twin, times
 
 BASE = "legv2"
@@ -300,9 +301,7 @@ def _late(robot: Robot, rng: np.random.Generator) -> Robot:
 
 def _soft_enough(robot: Robot) -> Robot:
     """Return the robot with transmissions that a training can simulate."""
-    for name, link in zip(JOINTS, (robot.thigh, robot.shank), strict=True):
-        about_joint = link.inertia + link.mass * link.com**2
-        most = 0.5 / (1 / getattr(robot, name).armature + 1 / about_joint) / _STEP**2
-        path = f"reality.{name}.stiffness"
+    for name in JOINTS:
+        path, most = f"reality.{name}.stiffness", 0.5 * stiffest(robot, name, _STEP)
         robot = replace_at(robot, path, min(attrgetter(path)(robot), most))
     return robot

@@ -98,8 +98,8 @@ def _row(robot: Robot, timestep: float, fixed_base: bool) -> Records:
     _set_ground(row, robot, timestep)
     _set_drives(row, robot, timestep)
     _set_softness(row, robot, timestep)
-    for joint in np.flatnonzero(row["elastic"]):
-        _check_stiffness(robot, row, int(joint), timestep)
+    for joint in JOINTS:
+        _check_stiffness(robot, joint, timestep)
     latency = reality.latency
     row["command_latency"], row["command_jitter"] = latency.command, latency.jitter
     row["measurement_latency"] = latency.measurement
@@ -224,16 +224,24 @@ def _set_drives(row: Records, robot: Robot, timestep: float) -> None:
         row["half_backlash"][at] = drive.backlash / 2
 
 
-def _check_stiffness(robot: Robot, row: Records, joint: int, timestep: float) -> None:
-    """Rotor and link against the spring oscillate at w; semi-implicit Euler needs w dt < 2."""
-    link = (robot.thigh, robot.shank)[joint]
+def stiffest(robot: Robot, joint: str, timestep: float) -> float:
+    """Return the stiffest transmission of a joint that a physics step can simulate, N m/rad.
+
+    Rotor and link against the spring oscillate at w; semi-implicit Euler needs w dt < 2.
+    """
+    link = robot.thigh if joint == "hip" else robot.shank
     about_joint = link.inertia + link.mass * link.com**2
-    reduced = 1 / (1 / float(row["armature"][joint]) + 1 / about_joint)
-    stiffness = float(row["belt_stiffness"][joint])
-    if stiffness > reduced / timestep**2:
+    armature: float = getattr(robot, joint).armature
+    return 1 / (1 / armature + 1 / about_joint) / timestep**2
+
+
+def _check_stiffness(robot: Robot, joint: str, timestep: float) -> None:
+    stiffness = getattr(robot.reality, joint).stiffness
+    most = stiffest(robot, joint, timestep)
+    if stiffness is not None and stiffness > most:
         raise RobotError(
-            f"{robot.name}: 'reality.{JOINTS[joint]}.stiffness' is {stiffness:g} N m/rad, too stiff"
-            f" for a physics step of {timestep:g} s; give at most {reduced / timestep**2:.3g}, a"
-            f" smaller step (below {(reduced / stiffness) ** 0.5:.2g} s), or leave it out for a"
-            " rigid one."
+            f"{robot.name}: 'reality.{joint}.stiffness' is {stiffness:g} N m/rad, too stiff"
+            f" for a physics step of {timestep:g} s; give at most {most:.3g}, a smaller step"
+            f" (below {timestep * (most / stiffness) ** 0.5:.2g} s), or leave it out for a rigid"
+            " one."
         )
