@@ -53,7 +53,7 @@ def test_a_belt_is_found_from_a_far_start_and_what_is_stated_of_it_stays(tmp_pat
     names = ("knee.friction", "reality.knee.stiffness")
     found = identify(runs, load_robot(file), options=options(parameters=names))
     assert found.start.get(names[1]) == 900.0
-    assert [one.name for one in found.passes] == ["rigid", "elastic"]
+    assert [one.name for one in found.passes] == ["least-squares, first", "least-squares, second"]
     assert found.passes[1].found.cost < found.passes[0].found.cost
     assert found.hypothesis.get(names[1]) == pytest.approx(300.0, rel=0.3)
     save_robot(found, tmp_path / "mine.toml", file)

@@ -39,8 +39,7 @@ _SPREAD = 1.0  # first standard deviation of CMA-ES, in scales
 _CONVERGED = 1e-9  # range of a generation's costs, relative to its best, that ends CMA-ES
 _COLLAPSED = 1e-3  # standard deviation, in scales, below which a search by shares has ended
 _RECENT = 4  # generations whose best stand for election at the end of CMA-ES
-_FACTORS = (0.5, 1.1, 2.4)  # stiffnesses with which a search begins, over the usual one
-_NEAR = np.linspace(-0.4, 0.4, 9)  # logarithms of factors that are tried before each round
+_NEAR = np.linspace(-0.9, 0.9, 19)  # logarithms of factors that are tried before each round
 _FACTOR = 2.0  # the paper's second pass keeps the first one's parameters within this factor
 
 
@@ -91,9 +90,10 @@ class Pass:
 
     @property
     def values(self) -> dict[str, float]:
-        """Where it ended, by name, SI."""
+        """Where it ended, by name, SI, rounding left out that leads beyond bounds."""
         values = self.parameters.values(self.found.vector).tolist()
-        return dict(zip(self.parameters.names, values, strict=True))
+        ends = zip(self.parameters.parameters, values, strict=True)
+        return {p.name: min(max(value, p.low), p.high) for p, value in ends}
 
 
 def jacobian(
@@ -274,43 +274,28 @@ def search(
             found = cma_es(values, parameters, options, seed=seed, shares=shares, report=progress)
         return Pass(name, parameters, found)
 
-    every = plan.parameters
-    if plan.search == "least-squares" and every.shares.any():
-        return _elastic(every, run)
-    if plan.search != "two-pass":
+    every, paper = plan.parameters, plan.search == "two-pass"
+    # Stiffnesses tell nothing while all other numbers are far off.
+    added = [name for name in every.names if name.startswith("reality.") and plan.search != "cma"]
+    if paper:
+        added += pass_names([r.metadata.rig for r in objective.recordings])[1]
+    kept = tuple(p for p in every.parameters if p.name not in added)
+    if not added or not kept:
         return [run(plan.search, every)]
-    _, added = pass_names([r.metadata.rig for r in objective.recordings])
-    kept = tuple(p for p in plan.parameters.parameters if p.name not in added)
-    first = run("two-pass, first", replace(plan.parameters, parameters=kept), 0.0, 0.5)
-    return [first, run("two-pass, second", second_pass(plan.parameters, first), 0.5, 0.5)]
-
-
-def _elastic(every: ParameterSet, run: Callable[..., Pass]) -> list[Pass]:
-    """Search with rigid transmissions, then all from there, at each of several stiffnesses.
-
-    The cost has minima at many stiffnesses, and none tells while all other numbers are far off.
-    """
-    rest = tuple(p for p in every.parameters if not p.name.startswith("reality."))
     rigid = replace(every.base, robot=replace(every.base.robot, reality=NO_MISMATCH))
-    passes = [run("rigid", ParameterSet(rigid, rest), 0.0, 0.25)] if rest else []
-    bounds = {p.name: (p.low, p.high) for p in every.parameters}
-    start = passes[0].values if rest else {}
-    stiff, tried = [p for p in every.parameters if p.logarithmic], list[Pass]()
-    for factor in _FACTORS:
-        start |= {p.name: min(max(factor * p.start, p.low), p.high) for p in stiff}
-        chosen = choose(every.base, every.names, bounds=bounds, start=start)
-        tried.append(run("elastic", chosen, 0.25 * (1 + len(tried)), 0.25))
-    return [*passes, min(tried, key=lambda one: one.found.cost)]
+    first = run(f"{plan.search}, first", ParameterSet(rigid, kept), 0.0, 0.5)
+    second = second_pass(every, first, near=paper)
+    return [first, run(f"{plan.search}, second", second, 0.5, 0.5)]
 
 
-def second_pass(every: ParameterSet, first: Pass) -> ParameterSet:
-    """Return every parameter; those of the first pass start from its end, and near it."""
+def second_pass(every: ParameterSet, first: Pass, *, near: bool = True) -> ParameterSet:
+    """Return every parameter; those of the first pass start from its end, and may stay near it."""
     starts, bounds = first.values, {p.name: (p.low, p.high) for p in every.parameters}
     for p, value in zip(first.parameters.parameters, starts.values(), strict=True):
-        if not p.name.startswith("drive."):
+        if near and not p.name.startswith("drive."):
             reach = 0.1 * p.scale
-            near = (value / _FACTOR, value * _FACTOR, value - reach, value + reach)
-            bounds[p.name] = (max(p.low, min(near)), min(p.high, max(near)))
+            ends = (value / _FACTOR, value * _FACTOR, value - reach, value + reach)
+            bounds[p.name] = (max(p.low, min(ends)), min(p.high, max(ends)))
     return choose(every.base, every.names, bounds=bounds, start=starts)
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cache, cached_property
 from operator import attrgetter
 from typing import Any, get_type_hints
@@ -128,8 +128,6 @@ class Parameter:
     high: float
     scale: float
     """A change that matters at the start; searches work in units of it."""
-    logarithmic: bool = False
-    """Whether searches work in shares of the value, which is positive."""
 
     def __post_init__(self) -> None:
         if not self.low <= self.start <= self.high or not self.low < self.high:
@@ -172,8 +170,8 @@ class ParameterSet:
 
     @cached_property
     def shares(self) -> BoolArray:
-        """Which are searched in shares of their value, (k,)."""
-        return np.array([p.logarithmic for p in self.parameters])
+        """Which are searched in shares of their value, (k,): stiffnesses of transmissions."""
+        return np.array([name in STIFFNESS for name in self.names])
 
     @cached_property
     def start(self) -> Array:
@@ -202,8 +200,7 @@ class ParameterSet:
         """Return the hypotheses that search vectors stand for; ``vectors`` is (n, k)."""
         low, high = (self.values(b) for b in self.bounds)
         values = np.clip(self.values(vectors), low, high)
-        rows = (dict(zip(self.names, row, strict=True)) for row in values)
-        return [_simulable(self.base.replace(row)) for row in rows]
+        return [_simulable(self.base, dict(zip(self.names, v, strict=True))) for v in values]
 
 
 def choose(
@@ -226,20 +223,17 @@ def choose(
         low, high = (bounds or {}).get(name) or _widest_bounds(name, value)
         at_low = value == low == 0.0 or math.isclose(value, low, rel_tol=1e-12)
         scale = 0.02 * (high - low) if at_low else max(0.3 * abs(value), 1e-3 * (high - low))
-        if shares := name in STIFFNESS:
+        if name in STIFFNESS:
             low, scale = max(low, 1e-3 * value), _ROUGH * value
-        parameters.append(Parameter(name, units[name], value, low, high, scale, shares))
+        parameters.append(Parameter(name, units[name], value, low, high, scale))
     return ParameterSet(base, tuple(parameters))
 
 
-def _simulable(hypothesis: LegHypothesis) -> LegHypothesis:
-    """Return a hypothesis with transmissions no stiffer than the physics step allows."""
-    robot = hypothesis.robot
-    for joint in JOINTS:
-        if (stiffness := getattr(robot.reality, joint).stiffness) is not None:
-            most = stiffest(robot, joint, COARSE_TIMESTEP)
-            robot = replace_at(robot, f"reality.{joint}.stiffness", min(stiffness, most))
-    return replace(hypothesis, robot=robot)
+def _simulable(base: LegHypothesis, values: Mapping[str, float]) -> LegHypothesis:
+    """Return a hypothesis with other values, and no stiffer than the physics step allows."""
+    found = base.replace(values)
+    most = (stiffest(found.robot, joint, COARSE_TIMESTEP) for joint in JOINTS)
+    return found.replace({n: m for n, m in zip(STIFFNESS, most, strict=True) if found.get(n) > m})
 
 
 def _widest_bounds(name: str, value: float) -> tuple[float, float]:

@@ -274,7 +274,8 @@ def posterior_robots(path: Path, robot: Robot) -> tuple[Robot, ...]:
         RobotError: A draw contradicts the robot.
     """
     tree, robots = parse_json(path.read_bytes(), str(path)), list[Robot]()
-    if not replace(robot, reality=NO_MISMATCH).has_digest(tree.get("robot_digest", "")):
+    reality = replace(robot.reality, latency=NO_MISMATCH.latency)
+    if not replace(robot, reality=reality).has_digest(tree.get("robot_digest", "")):
         raise UsageError(f"{path} is not of {robot.name}; give --robot what `hop identify` wrote.")
     try:
         for row in tree["posterior"]["samples"]:

@@ -112,16 +112,10 @@ class ModelMismatch:
     @property
     def in_training(self) -> "ModelMismatch":
         """What of it training simulates: transmissions, delay and jitter of commands."""
-        hip, knee = (
-            DriveMismatch(
-                backlash=drive.backlash,
-                stiffness=drive.stiffness,
-                stiffness_damping=drive.stiffness_damping,
-            )
-            for drive in (self.hip, self.knee)
-        )
-        latency = replace(self.latency, measurement=0.0)
-        return ModelMismatch(latency=latency, hip=hip, knee=knee)
+        kept = ("backlash", "stiffness", "stiffness_damping")
+        drives = (self.hip, self.knee)
+        hip, knee = (DriveMismatch(**{k: getattr(d, k) for k in kept}) for d in drives)
+        return ModelMismatch(latency=replace(self.latency, measurement=0.0), hip=hip, knee=knee)
 
     def of_drives(self, attribute: str) -> Array:
         """Return an attribute of both drives, (2,); NaN where it is None."""
