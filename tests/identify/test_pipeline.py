@@ -129,7 +129,6 @@ def test_a_motor_is_never_found_weaker_than_its_own_limit(joint):
 
 FIXED = record(LEG, swing(1.0))
 STANDING = record(LEG, swing(1.0, "rail"), "rail")
-SPARSE = STANDING.with_metadata(rate_hz=100.0)
 TORQUES = record(LEG, swing(1.0), onboard="torque")
 
 
@@ -155,15 +154,21 @@ STRONG = {"stiffness": (800.0, 800.0), "damping": (0.0, 0.0)}
         ([FIXED, on("rail", "zoh")], "knee.load_friction", "drive.hip.damping"),
         ([FIXED], "hip.friction", "knee.load_friction"),
         ([on("rail")], "rail.friction", "knee.load_friction"),
-        ([FIXED, STANDING], "reality.knee.stiffness", "reality.hip.stiffness"),
-        ([FIXED], "hip.friction", "reality.knee.stiffness"),
-        ([SPARSE, FIXED], "rail.friction", "reality.knee.stiffness"),
+        ([FIXED, STANDING], "rail.friction", "reality.knee.stiffness"),
     ],
 )
 def test_what_recordings_can_tell_is_fitted_and_what_is_known_is_kept(recordings, fitted, kept):
     names = make_plan(recordings, LEG).parameters.names
     assert fitted in names
     assert kept not in names
+
+
+def test_what_is_asked_for_with_a_plus_is_fitted_besides():
+    def names(*asked):
+        return make_plan([FIXED], LEG, parameters=asked or None).parameters.names
+
+    assert names("+hip.armature") == [*names(), "hip.armature"]
+    assert names("rail.friction", "+hip.friction") == ["rail.friction", "hip.friction"]
 
 
 def test_a_plan_has_short_windows_where_nothing_holds_the_leg_and_begins_at_doubtful_gains():

@@ -2,11 +2,17 @@
 
 import json
 
+import numpy as np
+import pytest
+
 from hopping_leg.controllers.policy import Policy
+from hopping_leg.errors import RobotError
+from hopping_leg.io import replace_at
 from hopping_leg.rl import reach
 from hopping_leg.rl.run_folder import RunFolder
 from hopping_leg.rl.train import stages_of, train
-from tests.rl.learners import ROBOT, TINY_FAST, try_briefly
+from hopping_leg.robot import load_robot
+from tests.rl.learners import ROBOT, TINY_FAST, learn, learner, try_briefly
 
 
 def test_a_training_tells_how_its_stages_ended(tmp_path, monkeypatch):
@@ -29,6 +35,22 @@ def test_a_training_tells_how_its_stages_ended(tmp_path, monkeypatch):
             f"{row['score']} {1000 * row['score_m']:.1f} mm after {row['seconds']:.0f} s, {judged}"
         )
         assert f"  - {row['name']}: {told}" in card
+
+
+def test_a_leg_with_a_belt_and_jitter_is_trained_on_as_its_motors_see_it(tmp_path, monkeypatch):
+    stated = {"knee.stiffness": 400.0, "knee.stiffness_damping": 0.03, "latency.jitter": 1e-3}
+    belted = load_robot("legv2")
+    for name, value in stated.items():
+        belted = replace_at(belted, f"reality.{name}", value)
+    made = learn(learner(TINY_FAST, robot=belted), 320)
+    legs = made.task.legs
+    np.testing.assert_array_equal(legs.measured_q, legs.records["rotor"][:, :2])
+    assert np.abs(legs.measured_q - legs.q)[:, 1].max() > 1e-3
+    try_briefly(monkeypatch)
+    trained = train(TINY_FAST, belted, 0, tmp_path, quiet=True)
+    assert Policy.load(trained.policy).card.robot_digest == belted.digest
+    with pytest.raises(RobotError, match="beyond transmissions"):
+        train(TINY_FAST, replace_at(belted, "reality.knee.efficiency", 0.9), 0, tmp_path)
 
 
 def test_a_run_is_known_by_what_was_asked_and_its_card_says_what_is_in_reach(tmp_path, monkeypatch):

@@ -30,7 +30,7 @@ class IdentifyOptions:
     """What to identify and how."""
 
     parameters: tuple[str, ...] | None = None
-    """What to fit; None decides by what the recordings can tell."""
+    """What to fit; None decides by what the recordings can tell, to which ``+NAME`` adds."""
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Bounds that differ from the widest ones."""
     search: str | None = None

@@ -64,7 +64,6 @@ _GAINS = {"stiffness": 10.0, "damping": 0.5, "integral": 1.0}
 _USUAL, _SOFTEST = 0.3, 0.02
 """Stiffness of a transmission at first, and at least, over the stiffest that can be simulated."""
 _CREAK = 7e-5  # its damping at first, over that stiffness, s
-_DENSE = 200.0  # rows per second that show a transmission
 _OFTEN, _BEYOND = 0.8, 1.5  # share of the time, and factor, that tell a torque limit from a spike
 _FASTEST, _REACHED = 0.999, 0.8
 """Quantile that leaves spikes out, and share of it that a motor at least reaches by itself."""
@@ -94,7 +93,8 @@ def make_plan(
 ) -> FitPlan:
     """Decide how to identify a robot from recordings, on whatever rigs, as far as it is not said.
 
-    Bounds are those that differ from the widest ones; ``two-pass`` is the paper's search.
+    Bounds are those that differ from the widest ones; ``two-pass`` is the paper's search. Names of
+    ``parameters`` that begin with ``+`` come on top of what the recordings can tell.
     """
     search = search or "least-squares"
     if search not in SEARCHES:
@@ -104,7 +104,10 @@ def make_plan(
     if paper:  # Table I, and what is asked for besides
         first, second = pass_names(rigs)
         parameters = tuple(dict.fromkeys([*first, *second, *(parameters or gains)]))
-    names = parameters or tuple(_names(recordings, gains))
+    names = tuple(parameters or ["+"])
+    if besides := [name[1:] for name in names if name.startswith("+")]:
+        named = [name for name in names if not name.startswith("+")]
+        names = (*(named or _names(recordings, gains)), *filter(None, besides))
     believed = LegHypothesis(_without_reality(robot, names))
     start = believed.replace(_start(recordings, gains) | _transmissions(believed, names))
     limits = _bounds(recordings, robot) | dict(bounds or {})
@@ -162,15 +165,7 @@ def _names(recordings: Sequence[Recording], gains: list[str]) -> list[str]:
         names += [f"{joint}.load_friction" for joint in JOINTS]
     if all(measured):
         names += [f"{joint}.torque_gain" for joint in JOINTS]
-    if grounded and np.logical_or(commanded, measured).all() and all(map(_shows_belt, recordings)):
-        names += [f"{STIFFNESS[1]}{end}" for end in ("", "_damping")]
     return [*names, *_limits(recordings), *gains]
-
-
-def _shows_belt(recording: Recording) -> bool:
-    """Return whether a recording is dense and full enough to tell a soft knee from soft ground."""
-    height = recording.metadata.rig == "fixed-base" or recording.has_column("height_m")
-    return height and recording.has("velocity") and recording.metadata.rate_hz >= _DENSE
 
 
 def _open_gains(recordings: Sequence[Recording]) -> list[str]:
