@@ -208,8 +208,7 @@ def _note_setup(setup: RolloutConfig) -> list[str]:
             f"The physics step of {setup.timestep:g} s is coarser than {TIMESTEP:g} s; heights may"
             " be wrong: `python -m studies.physics_step` measures by how much."
         )
-    reality = setup.robot.reality
-    if reality != reality.in_training and setup.disturbance != NO_NOISE:
+    if setup.robot.reality != setup.robot.reality.in_training and setup.disturbance != NO_NOISE:
         notes.append(
             f"{setup.robot.name} brings latency, noise and losses of its own, and the paper's noise"
             " and delay came on top; --no-noise meets it as it is."

@@ -63,7 +63,6 @@ _GAINS = {"stiffness": 10.0, "damping": 0.5, "integral": 1.0}
 """Where a search for an unknown gain begins, in the gain's unit at the joint."""
 _USUAL, _SOFTEST = 0.3, 0.02
 """Stiffness of a transmission at first, and at least, over the stiffest that can be simulated."""
-_CREAK = 7e-5  # its damping at first, over that stiffness, s
 _OFTEN, _BEYOND = 0.8, 1.5  # share of the time, and factor, that tell a torque limit from a spike
 _FASTEST, _REACHED = 0.999, 0.8
 """Quantile that leaves spikes out, and share of it that a motor at least reaches by itself."""
@@ -93,8 +92,8 @@ def make_plan(
 ) -> FitPlan:
     """Decide how to identify a robot from recordings, on whatever rigs, as far as it is not said.
 
-    Bounds are those that differ from the widest ones; ``two-pass`` is the paper's search. Names of
-    ``parameters`` that begin with ``+`` come on top of what the recordings can tell.
+    Bounds are those that differ from the widest ones; ``two-pass`` is the paper's search. If all
+    names of ``parameters`` begin with ``+``, they come on top of what the recordings can tell.
     """
     search = search or "least-squares"
     if search not in SEARCHES:
@@ -104,12 +103,14 @@ def make_plan(
     if paper:  # Table I, and what is asked for besides
         first, second = pass_names(rigs)
         parameters = tuple(dict.fromkeys([*first, *second, *(parameters or gains)]))
-    names = tuple(parameters or ["+"])
-    if besides := [name[1:] for name in names if name.startswith("+")]:
-        named = [name for name in names if not name.startswith("+")]
-        names = (*(named or _names(recordings, gains)), *filter(None, besides))
-    believed = LegHypothesis(_without_reality(robot, names))
-    start = believed.replace(_start(recordings, gains) | _transmissions(believed, names))
+    names = list(parameters or ())
+    if all(name.startswith("+") for name in names):
+        names = [*_names(recordings, gains), *names]
+    names = [name.removeprefix("+") for name in names]
+    start = LegHypothesis(_without_reality(robot, names)).replace(_start(recordings, gains))
+    for joint, name in zip(JOINTS, STIFFNESS, strict=True):
+        if name in names and np.isnan(start.get(name)):
+            start = start.replace({name: _USUAL * stiffest(robot, joint, COARSE_TIMESTEP)})
     limits = _bounds(recordings, robot) | dict(bounds or {})
     chosen = choose(start, names, bounds=limits)
     for name in bounds or ():
@@ -140,15 +141,6 @@ def _without_reality(robot: Robot, names: Sequence[str]) -> Robot:
     fitted = (joint for joint in JOINTS if any(f"reality.{joint}." in name for name in names))
     kept = {joint: getattr(robot.reality.in_training, joint) for joint in fitted}
     return replace(robot, reality=replace(NO_MISMATCH, **kept))
-
-
-def _transmissions(believed: LegHypothesis, names: Sequence[str]) -> dict[str, float]:
-    """Return where numbers of transmissions begin that are fitted and that the robot lacks."""
-    found = dict[str, float]()
-    for joint, stiffness in zip(JOINTS, STIFFNESS, strict=True):
-        usual = _USUAL * stiffest(believed.robot, joint, COARSE_TIMESTEP)
-        found |= {stiffness: usual, f"{stiffness}_damping": _CREAK * usual}
-    return {k: value for k, value in found.items() if k in names and not believed.get(k) > 0}
 
 
 def _names(recordings: Sequence[Recording], gains: list[str]) -> list[str]:

@@ -229,10 +229,8 @@ def stiffest(robot: Robot, joint: str, timestep: float) -> float:
 
     Rotor and link against the spring oscillate at w; semi-implicit Euler needs w dt < 2.
     """
-    link = robot.thigh if joint == "hip" else robot.shank
-    about_joint = link.inertia + link.mass * link.com**2
-    armature: float = getattr(robot, joint).armature
-    return 1 / (1 / armature + 1 / about_joint) / timestep**2
+    link, axis = (robot.thigh, robot.hip) if joint == "hip" else (robot.shank, robot.knee)
+    return 1 / (1 / axis.armature + 1 / (link.inertia + link.mass * link.com**2)) / timestep**2
 
 
 def _check_stiffness(robot: Robot, joint: str, timestep: float) -> None:
@@ -241,7 +239,6 @@ def _check_stiffness(robot: Robot, joint: str, timestep: float) -> None:
     if stiffness is not None and stiffness > most:
         raise RobotError(
             f"{robot.name}: 'reality.{joint}.stiffness' is {stiffness:g} N m/rad, too stiff"
-            f" for a physics step of {timestep:g} s; give at most {most:.3g}, a smaller step"
-            f" (below {timestep * (most / stiffness) ** 0.5:.2g} s), or leave it out for a rigid"
-            " one."
+            f" for a physics step of {timestep:g} s; give at most {most:.3g}, a smaller step, or"
+            " leave it out for a rigid one."
         )
