@@ -12,11 +12,14 @@ from hopping_leg.controllers.registry import ENERGY_SHAPING
 from hopping_leg.evaluate import runner
 from hopping_leg.rl.recipes import get_recipe, randomise
 from hopping_leg.robot import load_robot
+from hopping_leg.sim import NO_NOISE
 from studies.shared import Row, do_all
 from studies.sim_to_real import steps
 from studies.sim_to_real.methods import DEFAULT, Method, choose_methods
 from studies.sim_to_real.twins import (
     LEAST_TWINS,
+    PLAY,
+    Noise,
     Twin,
     disturbance_of,
     find_twins,
@@ -34,8 +37,9 @@ class Experiment:
     twins need 20."""
     methods: tuple[str, ...] = DEFAULT
     """What policies are trained on, the others being compared with the first. Valid: identified,
-    cad, table-1, truth; those whose legs differ in training, identified-posterior and randomised;
-    and, not trained, energy-shaping, energy-shaping-tuned, universal, universal-identified."""
+    identified-belt, cad, table-1, truth; those whose legs differ in training,
+    identified-posterior and randomised; and, not trained, energy-shaping, energy-shaping-tuned,
+    universal, universal-identified."""
     seeds: tuple[int, ...] = (0,)
     """Seeds of the trainings, one of each method and twin each."""
     recipe: str = "fast"
@@ -48,6 +52,8 @@ class Experiment:
     """Apex heights at which the twins are tried, m."""
     repeats: int = 3
     """Runs of 15 s at each command."""
+    disturbance: Noise = "own"
+    """The paper's noise and delay in trials: ``own`` where a twin brings none itself."""
     jobs: int = 1
     """Recordings, fits, trainings or trials at the same time, each in its own process."""
     folder: Path = Path("runs/transfer")
@@ -79,7 +85,8 @@ class Chain:
                     "name": twin.name,
                     "robot_digest": twin.robot.digest,
                     "believed": twin.believed,
-                    "paper_disturbance": disturbance_of(twin.robot).delay_probability > 0,
+                    "paper_disturbance": disturbance_of(twin.robot, self.asked.disturbance)
+                    != NO_NOISE,
                 }
                 for twin in self.twins
             ],
@@ -94,12 +101,13 @@ class Chain:
         if method.truth:
             return twin.source
         if method.fitted:
-            return str(self._file("robots", f"{twin.name}-identified.toml"))
+            return str(self._fit(twin, belt=method.belt))
         return method.robot or twin.believed
 
     def identify(self) -> list[Row]:
         """Record the twins and identify them, if a method asks for it; return the fits."""
-        if not any(method.fitted for method in self.methods):
+        kinds = sorted({method.belt for method in self.methods if method.fitted})
+        if not kinds:
             return []
         seconds = self.asked.seconds
         files = {
@@ -117,15 +125,16 @@ class Chain:
         )  # fmt: skip
         digests = {key: row["digest"] for key, row in zip(files, recorded, strict=True)}
         jobs = []
-        for twin in self.twins:
+        for twin, belt in ((t, b) for t in self.twins for b in kinds):
             pair = [(twin, rig) for rig in steps.RIGS]
             asked = {
                 "believed": load_robot(twin.believed).digest,
                 "recordings": [digests[key] for key in pair],
+                **({"belt": PLAY} if belt else {}),
             }
-            file = self._file("robots", f"{twin.name}-identified.toml")
+            file = self._fit(twin, belt=belt)
             recordings = [files[key] for key in pair]
-            jobs.append((file.with_suffix(".json"), asked, steps.fit, twin, recordings, file))
+            jobs.append((file.with_suffix(".json"), asked, steps.fit, twin, recordings, file, belt))
         return do_all(jobs, self.asked.jobs)
 
     def train(self) -> list[Row]:
@@ -152,13 +161,14 @@ class Chain:
             recipe = recipe.replace({"task.randomised": steps.interval_ranges(fitted)})
         else:
             recipe = randomise(recipe, method.ranges)
-        asked = {"recipe": repr(recipe), "robot": simulated(source).digest, "seed": seed}
+        robot = simulated(source, belt=method.belt)
+        asked = {"recipe": repr(recipe), "robot": robot.digest, "seed": seed}
         name = f"{twin.name}-{method.name}"
         if not method.fitted and not method.truth:
             name = Path(source).stem + ("" if method.ranges == "none" else f"-{method.ranges}")
         mark = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:8]
         folder = self._file("training", f"{name}-seed{seed}-{mark}")
-        return (folder.with_name(f"{folder.name}.json"), asked, steps.learn, recipe, source, seed,
+        return (folder.with_name(f"{folder.name}.json"), asked, steps.learn, recipe, robot, seed,
                 folder)  # fmt: skip
 
     def _tuning(self, twin: Twin, method: Method) -> tuple[Any, ...]:
@@ -182,19 +192,25 @@ class Chain:
             elif not method.untrained:
                 controller = self._training(twin, method, seed)[-1] / "policy.onnx"
             told = self.source(twin, method) if method.untrained else twin.believed
-            file = self._file("trials", f"{twin.name}-{method.name}-seed{seed}.json")
+            noise = self.asked.disturbance
+            trial = f"{twin.name}-{method.name}-seed{seed}{'' if noise == 'own' else noise}"
+            file = self._file("trials", f"{trial}.json")
             asked = {
                 "policy": fingerprint(steps.load(controller, told)),
                 "twin": twin.robot.digest,
                 "commands": commands,
                 "repeats": repeats,
             }
-            jobs.append((file, asked, steps.hop, controller, told, twin, commands, repeats))
+            hops = commands, repeats, noise
+            jobs.append((file, asked, steps.hop, controller, told, twin, hops))
         return [
             {"method": method.name, "twin": twin.name, "seed": seed, **row}
             for (twin, method, seed), tried in zip(runs, do_all(jobs, self.asked.jobs), strict=True)
             for row in tried["rows"]
         ]
+
+    def _fit(self, twin: Twin, *, belt: bool) -> Path:
+        return self._file("robots", f"{twin.name}-identified{'-belt' if belt else ''}.toml")
 
     def _file(self, kind: str, name: str) -> Path:
         return self.asked.folder / kind / name

@@ -17,6 +17,7 @@ class Method:
         name: On the command line and in the results.
         meaning: A phrase for tables.
         fitted: Whether the robot is the twin as it is identified from recordings.
+        belt: Whether the fit and training know a belt, with assumed backlash and jitter.
         robot: Robot that is trained on without a fit; None takes the one that the twin extends.
         ranges: What every leg in training draws for itself, around the robot; ``intervals`` of
             the fit, or those of ``hop train``.
@@ -30,6 +31,7 @@ class Method:
     name: str
     meaning: str
     fitted: bool = False
+    belt: bool = False
     robot: str | None = None
     ranges: Randomise | Literal["intervals"] = "none"
     truth: bool = False
@@ -41,6 +43,7 @@ METHODS = {
     method.name: method
     for method in (
         Method("identified", "identified from both recordings", fitted=True),
+        Method("identified-belt", "identified, with the knee's belt", fitted=True, belt=True),
         Method(
             "identified-posterior",
             "identified, every leg drawn from the intervals of the fit",

@@ -25,7 +25,7 @@ from hopping_leg.sim import Measurement
 from hopping_leg.sim.randomization import RANDOMIZABLE, Range
 from studies.energy_shaping.tune import Tune
 from studies.shared import Row
-from studies.sim_to_real.twins import Twin, disturbance_of, simulated
+from studies.sim_to_real.twins import Noise, Twin, disturbance_of, with_play
 
 RIGS: tuple[Rig, ...] = ("fixed-base", "rail")
 
@@ -62,27 +62,28 @@ def _strokes(rig: Rig, seconds: float) -> Strokes:
     return fixed_base(swings=swings, duration=seconds)
 
 
-def fit(twin: Twin, recordings: Sequence[Path], file: Path) -> Row:
-    """Identify a twin and write the robot file.
+def fit(twin: Twin, recordings: Sequence[Path], file: Path, belt: bool) -> Row:
+    """Identify a twin, with the knee's belt if asked, and write the robot file.
 
     Returns:
         Errors on data that the fit has not seen, before and after, and the parameters.
     """
-    believed = load_robot(twin.believed)
+    believed = with_play(load_robot(twin.believed)) if belt else load_robot(twin.believed)
     links = {"thigh.inertia": believed.thigh.inertia, "shank.inertia": believed.shank.inertia}
     options = IdentifyOptions(
+        parameters=("+reality.knee.stiffness",) if belt else None,
         bounds={k: (v / _INERTIA_FACTOR, v * _INERTIA_FACTOR) for k, v in links.items()},
         effort=SearchOptions(tolerance=_USUAL_TOLERANCE),
     )
     identified = identify([load_recording(path) for path in recordings], believed, options=options)
     save_robot(identified, file, twin.believed)
     found = as_json(identified)
-    before, after, truth = found["start_validation"], found["validation"], simulated(twin.source)
+    before, after, truth = found["start_validation"], found["validation"], load_robot(twin.source)
     errors = ("closed_loop_position_rms_rad", "closed_loop_torque_rms_nm")
     kept = ("name", "unit", "start", "value", "interval_low", "interval_high", "at_bound",
             "bound_low", "bound_high")  # fmt: skip
     return {
-        "method": "identified",
+        "method": "identified-belt" if belt else "identified",
         "twin": twin.name,
         **{f"{name}_before": before[name] for name in errors},
         **{name: after[name] for name in errors},
@@ -115,14 +116,14 @@ def interval_ranges(parameters: Sequence[Row]) -> tuple[Range, ...]:
     return tuple(found)
 
 
-def learn(recipe: Recipe, source: str, seed: int, folder: Path) -> Row:
+def learn(recipe: Recipe, robot: Robot, seed: int, folder: Path) -> Row:
     """Train a policy in the simulation of a robot; a training that was killed goes on.
 
     Returns:
         How it hops in the simulation that it was trained in.
     """
     if not (folder / "policy.onnx").exists():
-        train(recipe, simulated(source), seed, folder, resume=True, threads=1, quiet=True)
+        train(recipe, robot, seed, folder, resume=True, threads=1, quiet=True)
     result = read_result(folder)
     errors = [trial["median_error_m"] for trial in result["selected"]["trials"]]
     return {
@@ -175,14 +176,18 @@ def load(controller: str | Path, told: str) -> Controller:
 
 
 def hop(
-    controller: str | Path, told: str, twin: Twin, commands: Sequence[float], repeats: int
+    controller: str | Path, told: str, twin: Twin, hops: tuple[Sequence[float], int, Noise]
 ) -> Row:
     """Let a controller that is told a robot hop on a twin; return ``rows`` as ``hops_of`` does."""
-    return {"rows": hops_of(load(controller, told), twin.robot, commands, repeats)}
+    return {"rows": hops_of(load(controller, told), twin.robot, *hops)}
 
 
 def hops_of(
-    controller: Controller, leg: Robot, commands: Sequence[float], repeats: int
+    controller: Controller,
+    leg: Robot,
+    commands: Sequence[float],
+    repeats: int,
+    noise: Noise = "own",
 ) -> list[Row]:
     """Let a controller hop on a leg, ``repeats`` runs of 15 s at each command, a record each.
 
@@ -192,7 +197,7 @@ def hops_of(
     """
     judged = runner.evaluate(
         [Entry("policy", WithinRange(controller, leg))],
-        RolloutConfig(leg, disturbance_of(leg), threads=1),
+        RolloutConfig(leg, disturbance_of(leg, noise), threads=1),
         commands=tuple(commands),
         repeats=repeats,
         seed=FIRST_SEED,

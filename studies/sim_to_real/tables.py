@@ -1,7 +1,7 @@
 """Numbers of sim-to-real trials: per method over twins and seeds, with intervals over twins."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -50,11 +50,9 @@ def tabulate(meanings: Mapping[str, str], trials: Sequence[Row]) -> Row:
 
 
 def median_over_twins(trials: Sequence[Row], name: str) -> Row:
-    """Return the median of a number, in m, and its interval over the twins."""
-    numbers = _of_twins(trials, name)
-    low, high = statistics.median_interval(numbers, _BOOTSTRAP_SEED, LEAST_TWINS)
+    """Return the median of a number, in m, and its interval over twins and seeds."""
+    median, low, high = _number([_cells(trials, name)], lambda of: float(np.median(of[0])))
     start = name.removesuffix("_m")
-    median = float(np.median(np.concatenate(numbers)))
     return {name: median, f"{start}_low_m": low, f"{start}_high_m": high}
 
 
@@ -62,24 +60,25 @@ def compare(first: str, other: str, trials: Sequence[Row]) -> Row:
     """Return the ratio of two methods' errors.
 
     The medians are over all trials; the interval resamples whole twins, so that both methods keep
-    meeting the same ones; it is NaN with fewer than ``LEAST_TWINS``.
+    meeting the same ones, and each method's seeds; it is NaN with fewer than ``LEAST_TWINS``.
     """
-    below, above = (_of(trials, "method", name) for name in (first, other))
-    errors = [_of_twins(rows, _ERROR) for rows in (above, below)]
-    count = len(errors[0])
+    errors = [_cells(_of(trials, "method", name), _ERROR) for name in (other, first)]
+    numbers = _number(errors, lambda of: float(np.median(of[0]) / np.median(of[1])))
+    ratios = dict(zip(("ratio", "ratio_low", "ratio_high"), numbers, strict=True))
+    return {"method": other, "over": first, **ratios}
 
-    def ratio(index: Sequence[int]) -> float:
-        over, under = (np.median(np.concatenate([of[i] for i in index])) for of in errors)
-        return float(over / under)
 
-    low, high = statistics.bootstrap(range(count), ratio, _BOOTSTRAP_SEED, LEAST_TWINS)
-    return {
-        "method": other,
-        "over": first,
-        "ratio": ratio(range(count)),
-        "ratio_low": float(low),
-        "ratio_high": float(high),
-    }
+def _number(
+    methods: Sequence[list[dict[Any, list[float]]]], statistic: Callable[[list[Array]], float]
+) -> tuple[float, float, float]:
+    """Return a statistic of methods' numbers and its interval; twins and seeds are resampled."""
+    rng, twins = np.random.default_rng(_BOOTSTRAP_SEED), range(len(methods[0]))
+
+    def drawn(index: Sequence[int]) -> float:
+        return statistic([_drawn(cells, index, rng) for cells in methods])
+
+    low, high = statistics.bootstrap(twins, drawn, _BOOTSTRAP_SEED, LEAST_TWINS)
+    return statistic([_drawn(c, twins, None) for c in methods]), float(low), float(high)
 
 
 def _pooled(name: str, meaning: str, trials: Sequence[Row]) -> Row:
@@ -111,9 +110,19 @@ def _runs(trials: Sequence[Row]) -> list[list[Row]]:
     return [run for twin in _by("twin", trials).values() for run in _by("seed", twin).values()]
 
 
-def _of_twins(trials: Sequence[Row], name: str) -> list[Array]:
-    """Return a number of every trial, one array per twin."""
-    return [np.array([row[name] for row in rows]) for rows in _by("twin", trials).values()]
+def _cells(trials: Sequence[Row], name: str) -> list[dict[Any, list[float]]]:
+    """Return a number of every trial by twin and seed."""
+    twins = [_by("seed", rows) for rows in _by("twin", trials).values()]
+    return [{seed: [row[name] for row in run] for seed, run in of.items()} for of in twins]
+
+
+def _drawn(
+    cells: Sequence[dict[Any, list[float]]], index: Sequence[int], rng: np.random.Generator | None
+) -> Array:
+    """Return the numbers of some twins at all seeds, or at as many drawn ones, alike on all."""
+    seeds = list(cells[0])
+    seeds = seeds if rng is None else [seeds[k] for k in rng.integers(len(seeds), size=len(seeds))]
+    return np.concatenate([cells[i][seed] for i in index for seed in seeds])
 
 
 def _of(trials: Sequence[Row], key: str, value: object) -> list[Row]:

@@ -7,6 +7,7 @@ would come on top. A twin without [reality] is met with the paper's disturbance.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 from hopping_leg.controllers import Controller
 from hopping_leg.controllers.energy_shaping.controller import EnergyShaping
@@ -87,16 +88,33 @@ def find_twins(words: Sequence[str], folder: Path) -> tuple[Twin, ...]:
     return found
 
 
-def simulated(source: str) -> Robot:
-    """Return a robot as training simulates it: of [reality] it has the loop's delay alone."""
+PLAY = {"backlash": 1.75e-3, "stiffness_damping": 0.03}
+"""Assumed of the knee's belt: qdd100 +-0.1 deg at its output, behind the belt; rubber. SI."""
+_JITTER = 5e-4  # of commands, s, assumed with it
+
+Noise = Literal["own", "on", "off"]
+"""The paper's noise and delay in trials: ``own`` where a leg brings none itself."""
+
+
+def with_play(robot: Robot) -> Robot:
+    """Return a robot with what is assumed of its belt."""
+    knee = replace(robot.reality.knee, **PLAY)
+    return replace(robot, reality=replace(robot.reality, knee=knee))
+
+
+def simulated(source: str, *, belt: bool = False) -> Robot:
+    """Return a robot as training simulates it: with the loop's delay, and a belt if asked."""
     robot = load_robot(source)
-    latency = Latency(command=robot.reality.latency.command)
-    return replace(robot, reality=replace(NO_MISMATCH, latency=latency))
+    latency = Latency(command=robot.reality.latency.command, jitter=_JITTER if belt else 0.0)
+    known = robot.reality.in_training if belt else NO_MISMATCH
+    robot = replace(robot, reality=replace(known, latency=latency))
+    return with_play(robot) if belt else robot
 
 
-def disturbance_of(robot: Robot) -> NoiseAndDelay:
+def disturbance_of(robot: Robot, noise: Noise = "own") -> NoiseAndDelay:
     """Return what a leg is tried with on top of what it brings: nothing, if it brings anything."""
-    return NoiseAndDelay() if robot.reality.neutral else NO_NOISE
+    noisy = robot.reality.neutral if noise == "own" else noise == "on"
+    return NoiseAndDelay() if noisy else NO_NOISE
 
 
 def fingerprint(controller: Controller) -> str:

@@ -22,7 +22,7 @@ from studies import shared
 from studies.sim_to_real import steps
 from studies.sim_to_real.chain import Chain, Experiment
 from studies.sim_to_real.run import Options
-from studies.sim_to_real.twins import disturbance_of, find_twins, simulated
+from studies.sim_to_real.twins import PLAY, disturbance_of, find_twins, simulated
 from studies.tests.test_energy_shaping import scored_by_exponent
 
 
@@ -80,15 +80,15 @@ def test_no_method_but_the_truth_trains_on_what_the_twin_alone_knows(tmp_path):
     twin = one.twins[0]
     trained = [method for method in one.methods if not method.untrained]
     jobs = {method.name: one._training(twin, method, 0) for method in trained}
-    recipes, sources, folders = (
+    recipes, robots, folders = (
         {name: job[at] for name, job in jobs.items()} for at in (3, 4, 6)
     )  # fmt: skip
     for name in ("cad", "randomised"):
-        assert simulated(sources[name]) == load_robot("legv2")
-    assert simulated(sources["table-1"]) == load_robot("legv2-paper")
+        assert robots[name] == load_robot("legv2")
+    assert robots["table-1"] == load_robot("legv2-paper")
     assert recipes["cad"].task.randomised == ()
     assert recipes["randomised"].task.randomised == IDENTIFIABLE_RANGES
-    truth = simulated(sources["truth"])
+    truth = robots["truth"]
     assert truth.reality == truth.reality.in_training
     assert twin.robot.reality != twin.robot.reality.in_training
     assert truth.reality.latency.command == twin.robot.reality.latency.command
@@ -96,6 +96,16 @@ def test_no_method_but_the_truth_trains_on_what_the_twin_alone_knows(tmp_path):
     assert disturbance_of(load_robot("legv2")).torque_noise > 0
     assert truth.rail == twin.robot.rail
     assert len(set(folders.values())) == len(folders)
+
+
+def test_a_belt_is_trained_on_as_fitted_and_noise_comes_when_asked(tmp_path):
+    one = chain(tmp_path, ("identified", "identified-belt"), disturbance="on")
+    assert disturbance_of(load_robot("legv2"), "off") == NO_NOISE
+    assert one.about()["twins"][0]["paper_disturbance"]
+    assert len({one.source(one.twins[0], method) for method in one.methods[:2]}) == 2
+    knee = simulated(one.twins[0].source, belt=True).reality.knee
+    assert knee.stiffness == one.twins[0].robot.reality.knee.stiffness
+    assert knee.backlash == PLAY["backlash"]
 
 
 def test_what_does_not_depend_on_twin_or_seed_is_done_once(tmp_path):

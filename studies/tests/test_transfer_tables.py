@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.sim_to_real.tables import compare, tabulate
+from studies.sim_to_real.tables import _ERROR, compare, tabulate
 
 
 def trials(errors, commands=(0.25, 0.35), **more):
@@ -53,6 +53,15 @@ def test_the_ratio_meets_the_same_twins():
     found = compare("identified", "cad", trials(errors))
     ratios = [found[name] for name in ("ratio", "ratio_low", "ratio_high")]
     assert ratios == pytest.approx([3.0] * 3)
+
+
+def test_intervals_resample_the_seeds_of_trainings_of_twins_that_are_alike():
+    rows = trials({name: {f"twin-{k}": (0.002, 0.002) for k in range(20)} for name in ERRORS})
+    rows = [row | {"seed": n, _ERROR: 2e-3 * (1 + n)} for n in range(3) for row in rows]
+    found = compare("identified", "cad", rows)
+    assert found["ratio_low"] < 0.7 < found["ratio"] < 1.4 < found["ratio_high"]
+    row = rows_of([row for row in rows if row["method"] == "identified"])[0]
+    assert row["median_abs_error_low_m"] < row[_ERROR] < row["median_abs_error_high_m"]
 
 
 def test_order_is_of_the_apexes_and_a_leg_that_stands_has_none():
