@@ -183,11 +183,7 @@ def hop(
 
 
 def hops_of(
-    controller: Controller,
-    leg: Robot,
-    commands: Sequence[float],
-    repeats: int,
-    noise: Noise = "own",
+    controller: Controller, leg: Robot, heights: Sequence[float], repeats: int, noise: Noise = "own"
 ) -> list[Row]:
     """Let a controller hop on a leg, ``repeats`` runs of 15 s at each command, a record each.
 
@@ -198,7 +194,7 @@ def hops_of(
     judged = runner.evaluate(
         [Entry("policy", WithinRange(controller, leg))],
         RolloutConfig(leg, disturbance_of(leg, noise), threads=1),
-        commands=tuple(commands),
+        commands=tuple(heights),
         repeats=repeats,
         seed=FIRST_SEED,
         kinds=("fixed",),

@@ -7,7 +7,7 @@ would come on top. A twin without [reality] is met with the paper's disturbance.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from hopping_leg.controllers import Controller
 from hopping_leg.controllers.energy_shaping.controller import EnergyShaping
@@ -88,7 +88,7 @@ def find_twins(words: Sequence[str], folder: Path) -> tuple[Twin, ...]:
     return found
 
 
-PLAY = {"backlash": 1.75e-3, "stiffness_damping": 0.03}
+PLAY: dict[str, Any] = {"backlash": 1.75e-3, "stiffness_damping": 0.03}
 """Assumed of the knee's belt: qdd100 +-0.1 deg at its output, behind the belt; rubber. SI."""
 _JITTER = 5e-4  # of commands, s, assumed with it
 
