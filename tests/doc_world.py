@@ -21,7 +21,7 @@ SHORTER = {
     "hop doctor --home": "--yes",
     "hop doctor --write": "--yes",
     "hop emulate": "--seconds 0.3 --no-realtime",
-    "hop evaluate": "--seeds 1 --commands 0.3 --floor soft --no-video",
+    "hop evaluate": "--seeds 1 --commands 0.3 --floor soft",
     "hop record fixed-base": "--amplitudes 0.05 --periods 0.5 --swings 10 --duration 10",
     "hop record moving-base": "--amplitudes 0.05 --periods 0.5 --duration 10",
     "hop record multisine": "--duration 10",

@@ -21,7 +21,7 @@ COMMAND = re.compile(r"^```sh\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 SHORT = {
     "train": "--steps 512 --heights 0.28 0.32"
     " --set num_envs=8 batch_size=64 log_every=1 calibrations=1",
-    "evaluate": "--commands 0.3 --seeds 1 --floor soft --no-video",
+    "evaluate": "--commands 0.3 --seeds 1 --floor soft",
     "robustness": "--commands 0.3 --seeds 1",
 }
 """What makes a verb's command short."""

@@ -1,6 +1,6 @@
 """One look for all figures: colour-blind safe, units on every axis, the same bytes every time.
 
-A controller has one colour in figures, reports, videos, the viewer and the live page.
+A controller has one colour in figures, reports, the viewer and the live page.
 """
 
 import functools

@@ -11,9 +11,7 @@ _FRESH = 2000
 
 
 def _trials(controllers: str, name: str, options: str) -> str:
-    return (
-        f"hop evaluate {controllers} --no-video {options} --json studies/evaluation/results/{name}"
-    )
+    return f"hop evaluate {controllers} {options} --json studies/evaluation/results/{name}"
 
 
 def _precise(policy: str, name: str, options: str = "") -> str:

@@ -14,7 +14,7 @@ from tests.doc_pages import ROOT
 
 def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys):
     out = tmp_path / "run"
-    words = ["evaluate", "spring", "--commands", "0.3", "--seeds", "1", "--no-video"]
+    words = ["evaluate", "spring", "--commands", "0.3", "--seeds", "1"]
     assert main([*words, "--threads", "1", "--out", str(out)]) == 0
     data = json.loads((out / "evaluation.json").read_text())
     assert [row["command_m"] for row in data["summary"]] == [0.3]
@@ -85,7 +85,7 @@ def test_a_policy_is_judged_on_the_robot_that_lies_beside_it(tmp_path, monkeypat
     for named in (str(file), f"mine={file}"):
         assert robot_of([named]) == beside
     assert robot_of(["runs/*/policy.onnx"]) == "runs/my run/robot.toml"
-    short = ["--seeds", "1", "--commands", "0.3", "--floor", "soft", "--no-video"]
+    short = ["--seeds", "1", "--commands", "0.3", "--floor", "soft"]
     assert main(["evaluate", str(file), "--robot", "legv2", *short]) == 0
     said = capsys.readouterr().out
     assert said.index("was trained on robot 'my-leg'") < said.index("soft floor")

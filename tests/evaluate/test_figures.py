@@ -1,15 +1,11 @@
-import io
-
 import numpy as np
 import polars as pl
 import pytest
-from PIL import Image
 
 from hopping_leg.evaluate import figures as drawing
 from hopping_leg.evaluate import metrics
 from hopping_leg.evaluate.report import draw_report_figures
 from hopping_leg.evaluate.trials import load_run, save_traces
-from hopping_leg.evaluate.video import CLIP_SECONDS, FRAME_RATE, render_videos, sample
 from hopping_leg.figures import controller_colours, encode
 from hopping_leg.hop_detection import find_hops
 from hopping_leg.trace import Trace
@@ -74,33 +70,3 @@ def test_an_estimators_bias_is_measured(fixed):
     assert found.apex_std_m == pytest.approx(0.0, abs=1e-4)
     assert found.hops > 10
     assert metrics.judge_estimator("spring", [fixed]) is None
-
-
-def test_a_clip_has_the_poses_of_the_run_at_its_frames(fixed):
-    poses = np.array(sample(fixed, 3.0, CLIP_SECONDS, rate=100))
-    start = int(np.searchsorted(fixed.column("time_s"), 3.0 - 1e-9))
-    ticks = slice(start, start + 2 * len(poses), 2)
-    for index, name in enumerate(("height_m", "hip_position_rad", "knee_position_rad")):
-        assert poses[:, index] == pytest.approx(fixed.column(name)[ticks])
-    assert set(poses[:, 3]) == {0.35}
-
-
-def test_without_opengl_there_is_a_reason_instead(robot, judged, monkeypatch):
-    monkeypatch.setenv("MUJOCO_GL", "nonsense")
-    (video,) = render_videos(robot, judged.runs).values()
-    assert video.content is None
-    assert "libegl1" in video.reason
-
-
-@pytest.mark.slow
-def test_a_video_moves_or_says_why_there_is_none(robot, judged):
-    (video,) = render_videos(robot, judged.runs).values()
-    if video.content is None:
-        assert video.reason
-        return
-    image = Image.open(io.BytesIO(video.content))
-    assert image.format == "WEBP"
-    assert image.n_frames == round(CLIP_SECONDS * FRAME_RATE)
-    first = np.asarray(image.convert("RGB"), dtype=float)
-    image.seek(image.n_frames // 2)
-    assert np.abs(np.asarray(image.convert("RGB"), dtype=float) - first).max() > 50

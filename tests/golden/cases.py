@@ -193,7 +193,7 @@ def evaluate(folder: Path) -> Values:
     file = folder / "result.json"
     hop(
         "evaluate", "energy-shaping", "--commands", 0.3, "--seeds", 1, "--floor", "soft",
-        "--threads", 1, "--no-video", "--json", file,
+        "--threads", 1, "--json", file,
     )  # fmt: skip
     tables = [table for table in json.loads(file.read_text()).values() if isinstance(table, list)]
     return [np.sort(np.array(list(_numbers(tables)), float))]

@@ -74,8 +74,6 @@ class Evaluate:
     floor: Literal["soft", "stiff", "both"] = "both"
     """The robot's own contact (soft), MuJoCo's default (stiff), or all trials on the first and
     the fixed ones on the second."""
-    video: bool = True
-    """Put a short video of each controller into the report, if OpenGL is available."""
 
 
 def load(args: Evaluate) -> "tuple[list[Entry], RolloutConfig]":
@@ -124,11 +122,8 @@ def _paper(
         trials.save_traces(judged.runs, traces)
     if report:
         from hopping_leg.evaluate.report import write_report
-        from hopping_leg.evaluate.video import render_videos
 
-        videos = render_videos(setup.robot, judged.runs) if args.video else None
-        page = write_report(replace(judged, evaluation=evaluation), videos)
-        io.write_atomically(report, page)
+        io.write_atomically(report, write_report(replace(judged, evaluation=evaluation)))
     options.say_written(numbers, report, traces)
 
 

@@ -81,7 +81,7 @@ def run(args: Reproduce) -> None:
     policy, _ = policies["identified"]
     judged = transfer.evaluation
     io.write_json(folder / "transfer.json", {**judged.to_json(), "notes": notes})
-    io.write_atomically(folder / "transfer.html", write_report(transfer, None))
+    io.write_atomically(folder / "transfer.html", write_report(transfer))
     others = ("fast",) if args.quick else shipped_policies()
     evaluate.run(
         evaluate.Evaluate(
@@ -90,7 +90,6 @@ def run(args: Reproduce) -> None:
             seeds=1 if args.quick else 5,
             out=folder,
             floor="soft" if args.quick else "both",
-            video=not args.quick,
         ),
         notes,
     )

@@ -1,7 +1,7 @@
 """The report: figures of an evaluation, and one HTML page that holds all and needs nothing."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from statistics import median_high
 
 from matplotlib.figure import Figure
@@ -9,9 +9,8 @@ from matplotlib.figure import Figure
 from hopping_leg.evaluate import figures, runner, tables
 from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.evaluate.trials import Run
-from hopping_leg.evaluate.video import Video
 from hopping_leg.figures import controller_colours
-from hopping_leg.html_page import data_uri, page_template, svg_uri
+from hopping_leg.html_page import page_template, svg_uri
 from hopping_leg.trace import Trace
 
 
@@ -52,8 +51,8 @@ def _examples(runs: Sequence[Run]) -> dict[str, Trace]:
     return {name: near[name] for name in _first(single)}
 
 
-def write_report(judged: runner.EvaluationRun, videos: Mapping[str, Video] | None = None) -> bytes:
-    """Return the report as HTML, with the video of each controller if there are some."""
+def write_report(judged: runner.EvaluationRun) -> bytes:
+    """Return the report as HTML."""
     evaluation = judged.evaluation
     values = evaluation.to_json()
     conditions = {**values["conditions"], "versions": values["versions"]}
@@ -64,8 +63,6 @@ def write_report(judged: runner.EvaluationRun, videos: Mapping[str, Video] | Non
         verdict=tables.verdict,
         tables=tables.evaluation_tables(values),
         figures=draw_report_figures(evaluation, judged.runs),
-        videos=videos or {},
-        data_uri=data_uri,
         svg_uri=svg_uri,
         conditions=json.dumps(conditions, indent=1, ensure_ascii=False),
     )
