@@ -5,7 +5,6 @@ import pytest
 
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.robot import GroundMismatch, load_robot
-from hopping_leg.viewer import live_leg
 from hopping_leg.viewer.live_leg import LiveSettings, LiveSimulation, default_settings
 
 ROBOT = "legv2-paper"
@@ -128,33 +127,3 @@ def test_an_unstable_leg_stands_up_again_and_says_so_beside_one_that_hops_on():
     assert "stands up again" in notice
     assert np.isfinite(heights(live, 1)).all()
     np.testing.assert_array_equal(heights(live, 0), heights(other, 0))
-
-
-class Compiling:
-    """A process that compiles until it is told to end."""
-
-    code = None
-
-    def poll(self):
-        return self.code
-
-
-def test_mujoco_simulates_the_same_hops_until_the_stepper_is_compiled(monkeypatch):
-    process = Compiling()
-    monkeypatch.setattr(live_leg, "start_compiling", lambda: process)
-    early = LiveSimulation(("energy-shaping",), ROBOT, 0.3, at_once=True)
-    late = LiveSimulation(("energy-shaping",), ROBOT, 0.3)
-    for live in (early, late):
-        live.set_settings(dataclasses.replace(live.settings, noise=False))
-        live.advance(1.0)
-    np.testing.assert_allclose(heights(early), heights(late), atol=2e-3)
-    delayed = dataclasses.replace(early.settings, delay=0.01)
-    with pytest.raises(UsageError, match="once the leg's physics is compiled"):
-        early.set_settings(delayed)
-    before = heights(early)[-1]
-    process.code = 0
-    early.advance(0.005)
-    assert heights(early)[-1] == pytest.approx(before, abs=0.02)
-    early.set_settings(delayed)
-    early.advance(2.0)
-    assert last_apexes(early).max() > 0.28, "it still hops"

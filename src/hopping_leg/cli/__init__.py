@@ -26,7 +26,7 @@ import tyro
 from hopping_leg.errors import HoppingLegError, UsageError, unknown_name
 
 VERBS = {
-    "demo": "watch learned beside classical control in the browser, at once",
+    "demo": "watch learned beside classical control in the browser",
     "robots": "list the legs, show every number, import or check your own",
     "evaluate": "run the paper's trials for controllers and write the report",
     "train": "train a controller from scratch, or go on after an interruption",

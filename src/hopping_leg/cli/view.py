@@ -86,10 +86,5 @@ def _source(args: View) -> "Source":
         return ReplaySource(args.trace, args.robot)
     if args.box is not None:
         return RecorderSource(args.box, args.robot)
-    return LiveSimulation(
-        args.controllers,
-        args.robot or robot_of(args.controllers),
-        args.height,
-        args.seed,
-        at_once=True,
-    )
+    robot = args.robot or robot_of(args.controllers)
+    return LiveSimulation(args.controllers, robot, args.height, args.seed)

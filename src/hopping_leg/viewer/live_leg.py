@@ -1,7 +1,5 @@
 """A live simulation of one leg, or two side by side, that follow commands while they hop."""
 
-import subprocess
-import sys
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,10 +15,7 @@ from hopping_leg.sim import (
     Measurement,
     NoiseAndDelay,
     Plant,
-    stepper,
 )
-from hopping_leg.sim.compiled import FOLDER, say_compiling, was_compiled
-from hopping_leg.sim.mujoco_simulator import MujocoSimulator
 from hopping_leg.viewer.tracks import FIELDS, KEPT, MOST, Track
 
 PUSH_SECONDS = 0.05
@@ -68,16 +63,6 @@ def default_settings(robot: Robot) -> LiveSettings:
     return LiveSettings(time_constant=min(max(own, low), high))
 
 
-def start_compiling() -> "subprocess.Popen[bytes] | None":
-    """Begin to compile the stepper in another process; None if that was done or cannot be kept."""
-    if FOLDER is None or was_compiled(stepper.step_legs):
-        return None
-    say_compiling()
-    code = "import os; getattr(os, 'nice', int)(10)\n"  # the page goes first
-    code += "from hopping_leg.sim.leg_simulator import compile_physics; compile_physics()"
-    return subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL)
-
-
 _ALL = slice(None)
 _IMPOSSIBLE = 1e4
 """Joint speed that no leg reaches, rad/s."""
@@ -93,7 +78,6 @@ class LiveSimulation:
         robot: Name or file.
         height: Commanded first, m; brought into what the controllers can be asked for.
         seed: Of noise and random delay.
-        at_once: Let MuJoCo simulate while the stepper is being compiled, if it never was here.
 
     Raises:
         UsageError: There is no such controller, or they share no height.
@@ -109,8 +93,6 @@ class LiveSimulation:
         robot: str,
         height: float,
         seed: int = 0,
-        *,
-        at_once: bool = False,
     ) -> None:
         self.notices: list[str] = []
         self.now = 0.0
@@ -119,14 +101,10 @@ class LiveSimulation:
         self.height = height
         self.robot = load_robot(robot)
         self.settings = default_settings(self.robot)
-        self._compiling = start_compiling() if at_once else None
         self.begin(controllers, robot)
 
     def advance(self, seconds: float) -> None:
         """Let simulated time pass, in whole ticks."""
-        if self._compiling is not None and self._compiling.poll() is not None:
-            self._compiling = None
-            self._go_on()
         for _ in range(round(seconds * CONTROL_RATE)):
             self.tick()
 
@@ -160,16 +138,10 @@ class LiveSimulation:
         self._force, self._push_ticks = force, round(PUSH_SECONDS * CONTROL_RATE)
 
     def set_settings(self, settings: LiveSettings) -> None:
-        """Change the settings while the legs hop; their controllers are not told.
-
-        Raises:
-            UsageError: The physics that knows of such settings is still being compiled.
-        """
-        in_mujoco = isinstance(self._legs, MujocoSimulator)
-        if in_mujoco and not settings.apply(self.robot).reality.neutral:
-            raise UsageError("Delays can be set once the leg's physics is compiled, in seconds.")
+        """Change the settings while the legs hop; their controllers are not told."""
         self.settings = settings
-        self._go_on()
+        self._legs.set_robots([settings.apply(self.robot)] * self._legs.count)
+        self._meet()
 
     def begin(self, names: tuple[str, ...], robot_name: str) -> None:
         """Begin anew with controllers on a robot; another robot has its own settings.
@@ -190,7 +162,8 @@ class LiveSimulation:
         self._controllers = controllers
         self.tracks = [Track(c.name, robot, depth=KEPT) for c in controllers]
         self._rng = np.random.default_rng(self._seed)
-        self._legs = self._simulator()
+        changed = self.settings.apply(robot)
+        self._legs = LegSimulator(changed, len(controllers), rate=CONTROL_RATE, threads=1)
         self._meet()
         self.stand()
 
@@ -200,23 +173,6 @@ class LiveSimulation:
         for controller in self._controllers[which]:
             controller.reset(1)
         self._restart(which)
-
-    def _go_on(self) -> None:
-        """Go on with the present settings in the present state."""
-        before = self._legs
-        if isinstance(before, LegSimulator):
-            before.set_robots([self.settings.apply(self.robot)] * before.count)
-        else:
-            self._legs = self._simulator()
-            self._legs.state[:] = before.state
-            self._legs.forget(_ALL)
-        self._meet()
-
-    def _simulator(self) -> LegSimulator | MujocoSimulator:
-        changed = self.settings.apply(self.robot)
-        early = self._compiling is not None and changed.reality.neutral
-        kind = MujocoSimulator if early else LegSimulator
-        return kind(changed, len(self._controllers), rate=CONTROL_RATE, threads=1)
 
     def _meet(self) -> None:
         """Let the controllers meet the legs through sensors, noise and delay."""
