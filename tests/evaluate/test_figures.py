@@ -1,28 +1,10 @@
-import numpy as np
-import polars as pl
 import pytest
 
 from hopping_leg.evaluate import figures as drawing
-from hopping_leg.evaluate import metrics
 from hopping_leg.evaluate.report import draw_report_figures
 from hopping_leg.evaluate.trials import load_run, save_traces
 from hopping_leg.figures import controller_colours, encode
-from hopping_leg.hop_detection import find_hops
 from hopping_leg.trace import Trace
-
-
-def with_estimate(trace, offset=0.01):
-    """A trace of a controller that is always ``offset`` too high, also about its last apex."""
-    height = trace.column("height_m")
-    hops = find_hops(height, trace.column("height_rate_m_s"), trace.column("foot_clearance_m"))
-    apex = np.full(len(height), np.nan)
-    for tick, value in zip(hops.tick, hops.apex, strict=True):
-        apex[tick + 5 :] = value + offset
-    columns = [
-        pl.Series(metrics.ESTIMATED_HEIGHT, height + offset),
-        pl.Series(metrics.ESTIMATED_APEX, apex),
-    ]
-    return Trace(trace.table.with_columns(columns), trace.header)
 
 
 @pytest.fixture(scope="module")
@@ -59,14 +41,3 @@ def test_the_gallery_from_stored_traces_is_the_reports(judged, tmp_path):
     assert all("/ " in label for label in labels), "axes have units"
     for kind in ("svg", "pdf", "png"):
         assert encode(after["staircase"], kind) == encode(before["staircase"], kind)
-
-
-def test_an_estimators_bias_is_measured(fixed):
-    found = metrics.judge_estimator("spring", [with_estimate(fixed, 0.01)])
-    assert found.flight_bias_m == pytest.approx(0.01)
-    assert found.stance_bias_m == pytest.approx(0.01)
-    assert found.apex_bias_m == pytest.approx(0.01, abs=1e-4)
-    assert found.flight_std_m == pytest.approx(0.0, abs=1e-9)
-    assert found.apex_std_m == pytest.approx(0.0, abs=1e-4)
-    assert found.hops > 10
-    assert metrics.judge_estimator("spring", [fixed]) is None

@@ -1,11 +1,9 @@
-import dataclasses
-
 import numpy as np
 import polars as pl
 import pytest
 
 from hopping_leg.evaluate.metrics import measure, skipped_in_run
-from hopping_leg.evaluate.result import pool_group, summarise
+from hopping_leg.evaluate.result import summarise
 from hopping_leg.trace import COLUMNS, Trace
 
 RATE = 200.0
@@ -78,24 +76,6 @@ def test_a_hop_missed_right_after_a_switch_is_seen_in_the_whole_run():
     missed = with_column(trace, "foot_clearance_m", clearance)
     assert skipped_in_run(trace) == 0
     assert skipped_in_run(missed) == 1
-
-
-def test_policies_of_one_recipe_are_pooled(judged):
-    first, errors = judged.evaluation.summary[0], (-0.004, 0.001, 0.003)
-    known = dataclasses.replace(first, std_m=0.01, skipped_hops=1, body_contacts=2)
-    rows = [dataclasses.replace(known, median_error_m=error) for error in errors]
-    (group,) = pool_group("fast", rows, 0)
-    assert (group.group, group.policies, group.motionless) == ("fast", 3, 0)
-    assert (group.median_error_m, group.worst_abs_error_m) == (0.001, 0.004)
-    assert (group.skipped_hops, group.body_contacts) == (3, 6)
-    assert errors[0] <= group.median_error_low_m <= group.median_error_high_m <= errors[-1]
-    silent = dataclasses.replace(rows[0], median_error_m=-0.05, std_m=np.nan, hops=0)
-    (group,) = pool_group("fast", [silent, *rows[1:]], 0)
-    assert (group.policies, group.motionless, group.worst_abs_error_m) == (3, 1, 0.05)
-    assert group.median_error_low_m == -0.05, "a policy that never hops stays, as a miss"
-    other = [dataclasses.replace(row, command_m=0.35, median_error_m=0.02) for row in rows]
-    groups = pool_group("fast", rows + other, 0)
-    assert [(g.command_m, g.median_error_m) for g in groups] == [(0.25, 0.001), (0.35, 0.02)]
 
 
 def test_a_run_without_hops_stays_in_median_distance_and_interval():

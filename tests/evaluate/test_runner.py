@@ -169,5 +169,3 @@ def test_patterns_and_labels_become_entries_with_ranges_and_warnings(load, name,
     assert [c.label for c in found] == labels
     assert found[0].command_range == (0.2, 0.4)
     assert found[0].notes[0].startswith(f"{labels[0]} was trained on robot 'other'")
-    groups = {c.group for c in found}
-    assert groups == ({"fast, 2 training seeds"} if name == "*.onnx" else {None})

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.evaluate import motor_load, statistics
-from hopping_leg.hop_detection import COLUMNS, FLIGHT_CLEARANCE, measure_hops, trace_hops
+from hopping_leg.evaluate import motor_load
+from hopping_leg.hop_detection import COLUMNS, measure_hops, trace_hops
 from hopping_leg.trace import Trace
 
 START_SECONDS = 2.0  # in which hops are dropped after the standing start
@@ -118,50 +118,8 @@ def pooled_apexes(windows: Sequence[HopWindow]) -> Array:
     return np.concatenate([w.apex for w in windows]) if windows else np.empty(0)
 
 
-ESTIMATED_HEIGHT = "estimated_height_m"
-"""Trace column: base height as estimated at each tick, m."""
-
 ESTIMATED_APEX = "estimated_apex_m"
 """Trace column: height of the last apex as estimated after its flight, m."""
-
-
-@dataclass(frozen=True)
-class Estimator:
-    """Estimated minus true height of a controller that estimates it, all runs pooled."""
-
-    controller: str
-    flight_bias_m: float
-    """Mean over ticks in flight."""
-    flight_std_m: float
-    stance_bias_m: float
-    stance_std_m: float
-    apex_bias_m: float
-    """Mean over hops of the apex estimated after landing minus the true one."""
-    apex_std_m: float
-    hops: int
-    """Hops that the controller noticed."""
-
-
-def judge_estimator(controller: str, traces: Sequence[Trace]) -> Estimator | None:
-    """Compare estimated with true heights after the first 2 s; None where there is no estimate."""
-    flight, stance, apex = [], [], []
-    for trace in traces:
-        if ESTIMATED_HEIGHT in trace.table.columns:
-            error = trace.column(ESTIMATED_HEIGHT) - trace.column("height_m")
-            known = (trace.column("time_s") >= START_SECONDS) & np.isfinite(error)
-            flying = trace.column("foot_clearance_m") >= FLIGHT_CLEARANCE
-            flight.append(error[known & flying])
-            stance.append(error[known & ~flying])
-            apex.append(apex_errors(trace))
-    if not any(map(len, flight + stance)):
-        return None
-    found = {"flight": flight, "stance": stance, "apex": apex}
-    numbers = {
-        f"{name}_{what}_m": statistics.of(statistic, np.concatenate(errors))
-        for name, errors in found.items()
-        for what, statistic in (("bias", np.mean), ("std", np.std))
-    }
-    return Estimator(controller, hops=sum(map(len, apex)), **numbers)
 
 
 def apex_errors(trace: Trace) -> Array:

@@ -15,7 +15,6 @@ from hopping_leg.evaluate.prediction import Prediction
 from hopping_leg.evaluate.trials import Run
 from hopping_leg.io import plain
 from hopping_leg.robot import Robot
-from hopping_leg.trace import Trace
 
 SCHEMA = 2
 """Version of the JSON, raised when a name changes its meaning."""
@@ -68,26 +67,6 @@ class Summary(MotorLoad):
 
 
 @dataclass(frozen=True)
-class Group:
-    """Several policies of one recipe, trained with different seeds, at one command."""
-
-    group: str
-    command_m: float
-    policies: int
-    motionless: int
-    """Policies that never hopped; their errors are misses, standing height minus command."""
-    median_error_m: float
-    """Median over policies of each policy's median error."""
-    median_error_low_m: float
-    """Lower end of its 95 % bootstrap interval, policies resampled."""
-    median_error_high_m: float
-    worst_abs_error_m: float
-    median_std_m: float
-    skipped_hops: int
-    body_contacts: int
-
-
-@dataclass(frozen=True)
 class Staircase:
     """The 30 s trial of one controller."""
 
@@ -117,10 +96,8 @@ class Evaluation:
     """Neighbouring commands compared: controller, neighbours."""
     distributions: list[dict[str, Any]]
     """Apexes behind ``summary``: controller, command_m, apexes_m."""
-    estimators: list[metrics.Estimator] = field(default_factory=list)
     predictions: list[Prediction] = field(default_factory=list)
     """What the legs do that an identification allows, if they were what hopped."""
-    groups: list[Group] = field(default_factory=list)
     conditions: dict[str, Any] = field(default_factory=dict)
     """Robot, digest, floor, disturbance, seeds, steps, rates."""
     versions: dict[str, str] = field(default_factory=dict)
@@ -136,10 +113,6 @@ class Evaluation:
     def controllers(self) -> list[str]:
         """Names in the order of the rows."""
         return list(dict.fromkeys(row.controller for row in self.summary))
-
-    def rows(self, controller: str) -> list[Summary]:
-        """Return a controller's rows of the summary, by rising command."""
-        return [row for row in self.summary if row.controller == controller]
 
     def to_json(self) -> dict[str, Any]:
         """Return plain values; numbers that do not exist are None."""
@@ -158,15 +131,12 @@ def tabulate(runs: Sequence[Run], seed: int, robot: Robot | None = None) -> Eval
         seed: Seed of the bootstrap.
         robot: The leg of all runs; without it nothing is told of its motors.
     """
-    traces: dict[str, list[Trace]] = {}
-    for run in runs:
-        traces.setdefault(run.controller, []).append(run.trace)
     measured = [(run, window) for run in runs for window in metrics.measure(run.trace)]
     measured.sort(key=lambda pair: pair[1].command)
 
     def windows(*kinds: str) -> dict[str, Windows]:
         """Return the windows in trials of some kinds by controller."""
-        found: dict[str, Windows] = {name: {} for name in traces}
+        found: dict[str, Windows] = {run.controller: {} for run in runs}
         for run, window in measured:
             if run.trial.kind in kinds:
                 found[run.controller].setdefault(window.command, []).append((run, window))
@@ -180,7 +150,6 @@ def tabulate(runs: Sequence[Run], seed: int, robot: Robot | None = None) -> Eval
         ]
 
     pooled = windows("fixed", "sequence")
-    estimators = (metrics.judge_estimator(name, own) for name, own in traces.items())
     return Evaluation(
         summary=rows("fixed", "sequence"),
         sequence=rows("sequence"),
@@ -198,7 +167,6 @@ def tabulate(runs: Sequence[Run], seed: int, robot: Robot | None = None) -> Eval
             for name, own in pooled.items()
             for at, found in own.items()
         ],
-        estimators=[found for found in estimators if found],
     )
 
 
@@ -298,29 +266,3 @@ def _centre(errors: list[Array]) -> tuple[float, float]:
 
 def _spread(apexes: list[Array]) -> float:
     return statistics.of(np.std, np.concatenate(apexes)) if apexes else float("nan")
-
-
-def pool_group(group: str, rows: Sequence[Summary], seed: int) -> list[Group]:
-    """Aggregate the summary rows of several policies of one recipe, one row per command."""
-    found = []
-    for command in sorted({row.command_m for row in rows}):
-        own = [row for row in rows if row.command_m == command]
-        errors = np.array([row.median_error_m for row in own])
-        low, high = statistics.median_interval(list(errors[:, None]), seed)
-        stds = np.array([row.std_m for row in own if row.hops])
-        found.append(
-            Group(
-                group=group,
-                command_m=command,
-                policies=len(own),
-                motionless=sum(not row.hops for row in own),
-                median_error_m=float(np.median(errors)),
-                median_error_low_m=low,
-                median_error_high_m=high,
-                worst_abs_error_m=float(np.abs(errors).max()),
-                median_std_m=statistics.of(np.median, stds),
-                skipped_hops=sum(row.skipped_hops for row in own),
-                body_contacts=sum(row.body_contacts for row in own),
-            )
-        )
-    return found

@@ -12,7 +12,7 @@ import numpy as np
 
 from hopping_leg.controllers import Controller, RolloutConfig
 from hopping_leg.controllers.policy import Policy
-from hopping_leg.controllers.registry import load_controller, shipped_policies
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import PolicyError, UsageError
 from hopping_leg.evaluate import motor_load, prediction, result, trials
 from hopping_leg.io import versions
@@ -27,8 +27,6 @@ class Entry:
     label: str
     """Name in all tables."""
     controller: Controller
-    group: str | None = None
-    """Name shared by policies of one recipe that differ in the training seed."""
     notes: tuple[str, ...] = ()
     """What a reader of the results must know about it."""
 
@@ -46,8 +44,6 @@ class Entry:
 def load_entries(names: Sequence[str], robot: Robot, rate: float) -> list[Entry]:
     """Load every controller that is named.
 
-    Policy files of one recipe that differ in their training seed become a group.
-
     Args:
         names: Shipped names, ``.onnx`` files, or patterns of such; ``LABEL=FILE`` gives a file
             another name in all tables, and those of ``runs/*/policy.onnx`` go by their folders.
@@ -59,7 +55,7 @@ def load_entries(names: Sequence[str], robot: Robot, rate: float) -> list[Entry]
         UsageError: There is no such controller.
     """
     expanded = dict.fromkeys(pair for text in names for pair in _expand(text))
-    return _grouped([_load(label, source, robot, rate) for label, source in expanded])
+    return [_load(label, source, robot, rate) for label, source in expanded]
 
 
 def check_entries(entries: Sequence[Entry], commands: Sequence[float]) -> None:
@@ -102,21 +98,6 @@ def _load(label: str, source: str, robot: Robot, rate: float) -> Entry:
     controller = load_controller(source, robot, rate=rate, other="accept", simulated=True)
     note = controller.stranger(robot, label) if isinstance(controller, Policy) else None
     return Entry(label, controller, notes=(note,) if note else ())
-
-
-def _grouped(entries: list[Entry]) -> list[Entry]:
-    """Put policy files of one recipe in a group where every one has a training seed of its own."""
-    cards = {
-        c.label: c.controller.card
-        for c in entries
-        if isinstance(c.controller, Policy) and c.label not in shipped_policies()
-    }
-    names: dict[str, str] = {}
-    for recipe in {card.recipe for card in cards.values()}:
-        seeds = {label: card.seed for label, card in cards.items() if card.recipe == recipe}
-        if len(set(seeds.values())) == len(seeds) > 1:
-            names |= dict.fromkeys(seeds, f"{recipe}, {len(seeds)} training seeds")
-    return [replace(c, group=names.get(c.label)) for c in entries]
 
 
 @dataclass(frozen=True)
@@ -178,13 +159,6 @@ def evaluate(
         notes += _note_stopped(entry.label, own, setup)
         runs += own
     measured = result.tabulate(runs, seed, world.robot)
-    groups = [
-        row
-        for group in dict.fromkeys(c.group for c in entries if c.group)
-        for row in result.pool_group(
-            group, [r for c in entries if c.group == group for r in measured.rows(c.label)], seed
-        )
-    ]
     conditions = {
         **setup_conditions(setup),
         "floor": floor,
@@ -195,7 +169,7 @@ def evaluate(
         "seed": seed,
         "seeds": repeats,
     }
-    told = replace(measured, groups=groups, notes=notes, conditions=conditions)
+    told = replace(measured, notes=notes, conditions=conditions)
     told = replace(told, predictions=prediction.predict(runs) if robots else [])
     return EvaluationRun(replace(told, versions=software_versions()), runs)
 

@@ -38,12 +38,8 @@ _LOOKS: dict[str, tuple[str, float, str]] = {
 }
 """How values of a name, or of names with an ending, are shown: unit, factor, form."""
 
-_SIGNED = ("median_error", "bias")
-
 _BAD: dict[str, Callable[[Any], bool]] = {
-    **dict.fromkeys(
-        ("skipped_hops", "body_contacts", "stop_contacts", "motionless"), lambda count: count > 0
-    ),
+    **dict.fromkeys(("skipped_hops", "body_contacts", "stop_contacts"), lambda count: count > 0),
     "rated_torque_share": lambda share: share > 1,
     "p": lambda p: p >= 1e-3,
 }
@@ -54,7 +50,7 @@ def _column(name: str) -> Column:
     """Return the column of an entry that rows have, under its name and unit; a dash for None."""
     ending = next((end for end in _LOOKS if end[0] == "_" and name.endswith(end)), "")
     unit, factor, form = _LOOKS.get(name, _LOOKS.get(ending, ("", 1, "")))
-    form = f"+z{form}" if any(word in name for word in _SIGNED) else form
+    form = f"+z{form}" if "median_error" in name else form
     words = name.removesuffix(ending).replace("_", " ")
     bad = _BAD.get(name, lambda _value: False)
 
@@ -84,8 +80,6 @@ _ERROR = "median_error_m median_error_low_m median_error_high_m"
 TABLES = {
     "summary": f"{_HOW} {_ERROR} std_m iqr_m hops skipped_hops hop_rate_hz flight_fraction"
     " max_sink_m min_base_height_m body_contacts",
-    "groups": f"group command_m policies motionless {_ERROR} worst_abs_error_m median_std_m"
-    " skipped_hops body_contacts",
     "load": f"{_HOW} peak_hip_torque_nm peak_knee_torque_nm rms_hip_torque_nm rms_knee_torque_nm"
     " rated_torque_share thermal_minutes mean_power_w mean_electrical_power_w peak_regeneration_w"
     " bus_voltage_rise_v",
@@ -95,8 +89,6 @@ TABLES = {
     "staircase": "controller commands_m median_apexes_m monotone monotone_runs runs skipped_hops",
     "distributions": "controller lower_m upper_m p cliffs_delta cliffs_delta_low"
     " cliffs_delta_high overlap",
-    "estimators": "controller flight_bias_m flight_std_m stance_bias_m stance_std_m apex_bias_m"
-    " apex_std_m hops",
 }
 """Tables of a page: what each shows of its rows, by their names in the JSON."""
 
