@@ -113,20 +113,6 @@ def test_torque_is_limited_by_the_frame_and_by_the_current(powered):
     assert powered.faults()[0] == Notice.MAX_CURRENT
 
 
-def test_heat_derates_then_faults(powered):
-    drive = powered.robot.drives[0]
-    torques = []
-    for heat in (10.0, 30.0, 40.0):
-        drive.disturbances.temperature = heat
-        powered.push(15.0)
-        torques.append(powered.read(R.CONTROL_TORQUE))
-    assert torques[0] == pytest.approx(15.0)
-    assert torques[0] > torques[1] > torques[2] >= 0.0
-    drive.disturbances.temperature = 50.0
-    powered.wait(0.001)
-    assert (powered.modes()[0], powered.faults()[0]) == (1, FaultCode.OVER_TEMPERATURE)
-
-
 def test_voltage_faults_only_where_power_is_on(bench):
     for drive in bench.robot.drives:
         drive.disturbances.voltage = 47 - drive.nominal_voltage
@@ -140,8 +126,8 @@ def test_voltage_faults_only_where_power_is_on(bench):
 def test_a_mode_write_resets_the_command(powered):
     powered.torque(0.5, 0.0)
     powered.cycle(powered.drives[0].make_position(position=math.nan, query=True))
-    assert powered.read(R.COMMAND_FEEDFORWARD_TORQUE) == 0.0
-    assert powered.read(R.COMMAND_KD_SCALE) == 1.0
+    command = powered.robot.drives[0].command
+    assert (command.feedforward, command.kd_scale) == (0.0, 1.0)
 
 
 def test_power_up_finds_the_output_within_a_turn_of_the_rotor_only():

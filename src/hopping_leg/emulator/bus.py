@@ -15,7 +15,7 @@ from moteus.multiplex import RegisterSubframe, StreamSubframe, SubframeType
 from moteus.protocol import Writer, scale_register
 
 from hopping_leg.deploy import frames
-from hopping_leg.emulator import diagnostic
+from hopping_leg.emulator import console
 from hopping_leg.emulator.drive import UNKNOWN_REGISTER, EmulatedDrive
 
 _MOST = 256  # Subframes that are read: a few bytes may ask for millions of registers
@@ -122,26 +122,24 @@ def act(message: Message, drive: EmulatedDrive, time: float) -> Errors:
     return errors
 
 
-def answer(
-    message: Message, drive: EmulatedDrive, time: float, errors: Errors
-) -> frames.Frame | None:
+def answer(message: Message, drive: EmulatedDrive, errors: Errors) -> frames.Frame | None:
     """Return the answer of a drive that is meant, with its failed writes; None if none is due."""
     reply = ReplyWriter()
     for register, code in errors:
         reply.error(register, code, reading=False)
-    _stream(message, drive, reply, time)
+    _stream(message, drive, reply)
     _read(message, drive, reply)
     return message.frame.reply(drive.id, reply.data) if message.frame.wants_reply else None
 
 
-def _stream(message: Message, drive: EmulatedDrive, reply: ReplyWriter, time: float) -> None:
+def _stream(message: Message, drive: EmulatedDrive, reply: ReplyWriter) -> None:
     for s in message.streams:
-        if s.channel != diagnostic.CHANNEL:
+        if s.channel != console.CHANNEL:
             continue
         if s.type is SubframeType.STREAM_CLIENT_TO_SERVER:
-            drive.diagnostic.write(s.data, time)
+            drive.console.write(s.data)
         elif s.type is SubframeType.STREAM_CLIENT_POLL_SERVER:
-            reply.stream(s.channel, drive.diagnostic.poll(s.data[0]))
+            reply.stream(s.channel, drive.console.poll(s.data[0]))
 
 
 def _read(message: Message, drive: EmulatedDrive, reply: ReplyWriter) -> None:
@@ -151,8 +149,8 @@ def _read(message: Message, drive: EmulatedDrive, reply: ReplyWriter) -> None:
     first = resolution = 0
     for s in message.reads:
         value = state.get(s.register)
-        if value is None and (s.register not in drive.identity or s.resolution == multiplex.INT32):
-            value = drive.stored(s.register)
+        if value is None and s.resolution == multiplex.INT32:
+            value = drive.identity.get(s.register)
         goes_on = run and s.register == first + len(run) and s.resolution == resolution
         if run and (value is None or not goes_on):
             reply.values(first, resolution, run)

@@ -11,12 +11,10 @@ from moteus.multiplex import F32
 from moteus.protocol import Register, scale_register
 
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode
-from hopping_leg.emulator import diagnostic, mode_machine, rotor_encoder, torque_law
+from hopping_leg.emulator import console, mode_machine, rotor_encoder, torque_law
 from hopping_leg.emulator.settings import Settings
 
-_AMBIENT = 30.0  # Temperature of an idle drive, degrees C
-_HEATING = 0.008  # Rise at rest over the square of the phase current, K/A2
-_WARMING_TIME = 60.0  # Time constant of the output stage, s
+_AMBIENT = 30.0  # Temperature of the output stage, degrees C
 _LOWEST_VOLTAGE = 4.0  # Below it the firmware reports under-voltage, V
 
 UNKNOWN_REGISTER, NOT_WRITABLE, INVALID_VALUE = 1, 2, 3
@@ -63,16 +61,16 @@ class EmulatedDrive:
     ) -> None:
         self.identity, self.settings = identity, settings
         self.encoder = rotor_encoder.RotorEncoder(settings, gear_ratio)
+        self.console = console.Console(settings)
         self.machine = mode_machine.ModeMachine()
         self.law = torque_law.TorqueLaw(settings)
         self.command = torque_law.Command()
-        self.diagnostic = diagnostic.Diagnostic(settings, self.encoder, self.stop)
         self.disturbances = Disturbances()
         self.uptime = 0.0
         self.sensed: dict[int, float] = {}  # What its auxiliary ports read, by register
         self._brake, self.nominal_voltage = brake * 2 * math.pi, voltage
         self._commanded = False
-        self._warmth = self._velocity = self._torque = self._asked = 0.0
+        self._velocity = self._torque = self._asked = 0.0
 
     @property
     def id(self) -> int:
@@ -87,7 +85,7 @@ class EmulatedDrive:
     @property
     def temperature(self) -> float:
         """Temperature of the output stage, degrees C."""
-        return _AMBIENT + self._warmth + self.disturbances.temperature
+        return _AMBIENT + self.disturbances.temperature
 
     @property
     def active(self) -> bool:
@@ -115,10 +113,8 @@ class EmulatedDrive:
             setattr(self.command, torque_law.COMMAND_FIELDS[register], float(scaled))
         elif register == Register.SET_OUTPUT_NEAREST:
             self.encoder.set_nearest(float(scaled))
-        elif register == Register.SET_OUTPUT_EXACT:
-            self.encoder.set_exact(float(scaled))
         else:
-            known = register in self.state() or self.stored(register) is not None
+            known = register in self.true_state() or register in self.identity
             return NOT_WRITABLE if known else UNKNOWN_REGISTER
         return 0
 
@@ -136,11 +132,6 @@ class EmulatedDrive:
             timeout = self.command.timeout or self.settings["servo.default_timeout_s"]
             self.machine.command(self.command.mode, time, timeout / self.disturbances.clock)
 
-    def stop(self, time: float) -> None:
-        """Stop, as ``d stop`` does."""
-        self._write_mode(DriveMode.STOPPED)
-        self.commit(time)
-
     def update_sensors(self, output: float, velocity: float, torque: float) -> None:
         """Set what the sensors see of the output after a step of physics: rev, rev/s, N m."""
         self.encoder.update(output)
@@ -150,7 +141,6 @@ class EmulatedDrive:
     def step(self, time: float, dt: float) -> float:
         """Begin one step of physics; return the torque asked of the motor's output, N m, finite."""
         self.uptime += dt * self.disturbances.clock
-        self._warmth += dt / _WARMING_TIME * (_HEATING * self._amperes**2 - self._warmth)
         position, settings = self.encoder.position, self.settings
         low, high = settings["servopos.position_min"], settings["servopos.position_max"]
         self.machine.advance(time, outside_limits=position < low or position > high)
@@ -175,7 +165,7 @@ class EmulatedDrive:
             torque = self.law.zero_velocity(self.command.kd_scale, self._velocity)
         else:
             return -self._brake * self._velocity if mode == DriveMode.BRAKE else 0.0
-        return self.law.limited(torque, position, self.temperature)
+        return self.law.limited(torque, position)
 
     def _check(self) -> None:
         """Go to fault where the firmware would."""
@@ -188,12 +178,6 @@ class EmulatedDrive:
             machine.trip(FaultCode.UNDER_VOLTAGE)
         if self.temperature > self.settings["servo.fault_temperature"]:
             machine.trip(FaultCode.OVER_TEMPERATURE)
-
-    def stored(self, register: int) -> float | None:
-        """Return a command or identity register, None if it is neither."""
-        if register in torque_law.COMMAND_FIELDS:
-            return float(getattr(self.command, torque_law.COMMAND_FIELDS[register]))
-        return self.identity.get(register)
 
     def state(self) -> dict[int, float]:
         """Return what the drive says of how it is, in its units."""

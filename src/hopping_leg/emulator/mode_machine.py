@@ -17,7 +17,6 @@ class Notice(IntEnum):
 
     MAX_VOLTAGE = 98
     MAX_CURRENT = 99
-    FET_TEMPERATURE = 100
     MAX_TORQUE = 102
     POSITION_BOUNDS = 103
 

@@ -110,7 +110,7 @@ class EmulatedRobot:
             if not message.is_for(drive):
                 continue
             errors = [] if late else bus.act(message, drive, self.time)
-            answer = bus.answer(message, drive, self.time, errors)
+            answer = bus.answer(message, drive, errors)
             if self.observer is not None:
                 self.observer.record(self.time, joint, message, answer)
             if answer is not None:

@@ -52,17 +52,8 @@ class RotorEncoder:
 
     def set_nearest(self, position: float) -> None:
         """Home: the output is within half a turn of the rotor of a position, revolutions."""
-        self._home(round(self._turns_to(position)))
-
-    def set_exact(self, position: float) -> None:
-        """Home: the output is exactly at a position, revolutions."""
-        self._home(self._turns_to(position))
-
-    def _turns_to(self, position: float) -> float:
-        return (position - self.position) * self._settings[_SIGN] / self._settings[_RATIO]
-
-    def _home(self, turns: float) -> None:
-        self._shift += turns
+        turns = (position - self.position) * self._settings[_SIGN] / self._settings[_RATIO]
+        self._shift += round(turns)
         self.home = _HOMED_OUTPUT
 
     def torque_to_output(self, torque: float) -> float:

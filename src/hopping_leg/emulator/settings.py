@@ -12,7 +12,6 @@ DEFAULTS: dict[str, int | float] = {
     "motor_position.output.sign": 1,
     "motor_position.rotor_to_output_ratio": 1 / 6,
     "servo.max_voltage": 46.0,
-    "servo.temperature_margin": 25.0,
     "servo.fault_temperature": 75.0,
     "servo.position_derate": 0.02,
     "servo.pid_position.kp": 50.0,
@@ -21,7 +20,6 @@ DEFAULTS: dict[str, int | float] = {
     "servo.timeout_max_torque_Nm": 5.0,
     "servo.timeout_mode": 12,
     "servo.max_current_A": 100.0,
-    "servo.derate_current_A": -20.0,
     "servopos.position_min": -0.01,
     "servopos.position_max": 0.01,
 }

@@ -1,7 +1,7 @@
 """From a command to the output's torque: the firmware's PD, zero velocity and limits.
 
-The integral term, trajectories, flux braking, speed and power limits are left out. A position that
-is NaN is left alone; the firmware holds the one in which the mode began.
+The integral term, trajectories, flux braking, and limits by heat, speed and power are left out. A
+position that is NaN is left alone; the firmware holds the one in which the mode began.
 """
 
 import math
@@ -72,25 +72,20 @@ class TorqueLaw:
         torque = -settings["servo.pid_position.kd"] * kd_scale * velocity
         return self._within(torque, settings["servo.timeout_max_torque_Nm"], Notice.MAX_TORQUE)
 
-    def limited(self, torque: float, position: float, temperature: float) -> float:
+    def limited(self, torque: float, position: float) -> float:
         """Return the torque that the limits leave, N m; NaN passes, as in the firmware.
 
-        The position, rev, is the output's as reported, the temperature, degrees C, the output
-        stage's.
+        The position, rev, is the output's as reported.
         """
-        settings, notice = self._settings, Notice.MAX_CURRENT
+        settings = self._settings
         low, high = settings["servopos.position_min"], settings["servopos.position_max"]
         beyond = max(position - high, 0.0) if torque > 0 else max(low - position, 0.0)
         if beyond > 0:
             self.notice = Notice.POSITION_BOUNDS
             torque *= max(0.0, 1 - beyond / settings["servo.position_derate"])
-        amperes, margin = settings["servo.max_current_A"], settings["servo.temperature_margin"]
-        hot = (temperature - (settings["servo.fault_temperature"] - margin)) / margin
-        if hot > 0:
-            left = amperes + hot * (settings["servo.derate_current_A"] - amperes)
-            amperes, notice = min(amperes, max(0.0, left)), Notice.FET_TEMPERATURE
         ratio = settings["motor_position.rotor_to_output_ratio"]
-        return self._within(torque, amperes * TORQUE_CONSTANT / ratio, notice)
+        most = settings["servo.max_current_A"] * TORQUE_CONSTANT / ratio
+        return self._within(torque, most, Notice.MAX_CURRENT)
 
     def _within(self, torque: float, most: float, notice: Notice) -> float:
         if abs(torque) > most:

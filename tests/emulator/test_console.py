@@ -39,16 +39,8 @@ def test_settings_are_read_set_and_kept(bench):
 
 @pytest.mark.parametrize(
     "line",
-    ["conf set servo.nonsense 1", "conf set id.id x", "hello", "d fly"],
+    ["conf set servo.nonsense 1", "conf set id.id x", "hello"],
 )
 def test_nonsense_is_an_error_that_the_client_raises(bench, line):
     with pytest.raises(moteus.moteus.CommandError, match="ERR"):
         console(bench, line)
-
-
-def test_the_console_stops_and_homes(bench):
-    bench.power()
-    console(bench, "d stop", "d exact 0.25")
-    bench.wait(0.001)
-    assert bench.modes()[0] == 0
-    assert bench.read(moteus.Register.POSITION) == pytest.approx(0.25, abs=1e-4)
