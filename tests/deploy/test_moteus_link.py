@@ -1,12 +1,10 @@
-"""What goes wrong on a serial line, against a real terminal: never a hang."""
+"""What goes wrong on the way to the drives: never a hang, and nothing old is taken for new."""
 
-import contextlib
 import math
 import os
 import pty
 import threading
 import time
-import tty
 
 import pytest
 from hypothesis import example, given
@@ -15,208 +13,120 @@ from hypothesis import strategies as st
 from hopping_leg.deploy import drive_info
 from hopping_leg.deploy.drive_link import LIMP, STOP, joint_transforms
 from hopping_leg.deploy.fdcanusb import Fdcanusb, SerialSensor
-from hopping_leg.deploy.frames import Frame
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.preflight import check_drives, require_fit
 from hopping_leg.deploy.replies import SLACK, DriveClock, read_reply
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.transport import open_transport
-from hopping_leg.emulator.ports import LineProtocol
+from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.server import EmulatorConfig
+from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot import load_robot
 
 LEG = load_robot("legv2")
-WAIT = 2.0
-"""Longest wait for replies, s: generous, as machines that run tests are slow."""
-
-MOST_BEHIND = 0.02
-"""Most that the emulated leg catches up with at once, s."""
+PERIOD = 0.005
 
 
-class Adapter:
-    """An fdcanusb with two drives at the other end of a terminal.
+def emulated(*faults, checksums=True):
+    return Lockstep(EmulatorConfig(robot="legv2", faults=faults).build(), checksums=checksums)
 
-    ``spoil(number, lines)`` may change the lines that answer the frame of that number.
-    """
 
-    def __init__(self):
-        self.master, self.slave = os.openpty()
-        for descriptor in (self.master, self.slave):
-            tty.setraw(descriptor)
-        self.path = os.ttyname(self.slave)
-        self.robot = EmulatorConfig(robot="legv2").build()
-        self.spoil = lambda number, lines: lines
-        self.reading = threading.Event()
-        self.reading.set()
-        self.frames = 0
-        self._begin = time.monotonic()
-        self._protocol = LineProtocol()
-        self._thread = threading.Thread(target=self._serve, daemon=True)
-        self._thread.start()
+def tick(run):
+    """Return the exchange of another tick in virtual time."""
+    now = run.wait_until(run.now() + PERIOD)
+    return run.link.exchange(STOP, now + 0.7 * PERIOD)
 
-    def pull_out(self):
-        os.close(self.slave)
-        os.close(self.master)
 
-    def say(self, line):
-        os.write(self.master, line + b"\r\n")
+@pytest.mark.parametrize("checksums", [True, False])
+def test_both_drives_answer_in_joint_units_whatever_else_is_on_the_line(checksums):
+    run = emulated(checksums=checksums)
+    for line in (b"", b"@#!%", b"rcv", b"rcv 100", b"rcv zz 2400 E", b"rcv 100 2 E", b"OK"):
+        run._port._write(line + b"\r\n")
+        replies = tick(run).replies
+        assert [reply.mode for reply in replies] == [0, 0], line
+        assert [reply.position for reply in replies] == pytest.approx(run.robot.leg.q, abs=1e-3)
+    run._port._write(b"ERR overrun\r\n")
+    tick(run)
+    assert None not in tick(run).replies
+    assert run.link.trouble == ("" if checksums else "ERR overrun")
+    run.link.close()
 
-    def _serve(self):
-        while True:
-            self.reading.wait()
-            try:
-                data = os.read(self.master, 4096)
-            except OSError:
-                return
-            for item in self._protocol.feed(data):
-                lines = [item] if isinstance(item, bytes) else self._answers(item)
-                with contextlib.suppress(OSError):
-                    os.write(self.master, b"".join(lines))
 
-    def _answers(self, frame: Frame):
-        behind = time.monotonic() - self._begin - self.robot.time
-        if behind > MOST_BEHIND:  # on a slow machine the leg stands still, not the drives' clocks
-            self.robot.stand_still(behind - MOST_BEHIND)
-            self._begin += behind - MOST_BEHIND
-        self.robot.advance(time.monotonic() - self._begin)
-        self.robot.receive(frame)
-        replies = [i.frame for i in self.robot.reply_queue.take(self.robot.time)]
-        lines = [self._protocol.line(reply.received) for reply in replies]
-        self.frames += 1
-        return self.spoil(self.frames, lines)
+def test_a_late_reply_is_not_taken_for_a_fresh_one():
+    run = emulated(Fault("late_reply", since="start", at=0.1, value=0.008, drive="knee"))
+    asked, found = [], []
+    for _ in range(40):
+        asked.append(run.now() + PERIOD)
+        found.append(tick(run))
+    (missing,) = (k for k, exchange in enumerate(found) if None in exchange.replies)
+    assert found[missing].replies[0] is not None
+    ((joint, late),) = (pair for exchange in found for pair in exchange.late)
+    assert joint == 1
+    assert abs(late.taken - asked[missing]) < 0.002
+    run.link.close()
 
 
 @pytest.fixture
-def adapter():
-    return Adapter()
+def port():
+    """A terminal at whose other end nobody listens: its end there, and a link through it."""
+    ours, theirs = pty.openpty()
+    os.set_blocking(ours, False)
+    return ours, os.ttyname(theirs), theirs
 
 
-def exchange(link, outgoing=STOP, wait=WAIT):
-    """Return an exchange of another tick; fail if it took much longer than it may."""
-    time.sleep(0.005)
-    start = time.monotonic()
-    result = link.exchange(outgoing, start + wait)
-    assert time.monotonic() - start < wait + 2.0
-    return result
+def hears_nothing(link, wait=0.05):
+    began = time.monotonic()
+    assert link.exchange(LIMP, began + wait).replies == (None, None)
+    assert time.monotonic() - began < wait + 2.0
 
 
-def whole(result):
-    return None not in result.replies
+def test_endless_noise_costs_the_deadline_and_no_more(port):
+    ours, path, _ = port
+    link, over = MoteusLink(LEG, Fdcanusb(path)), threading.Event()
 
+    def flood():
+        os.set_blocking(ours, True)
+        while not over.is_set():
+            os.write(ours, b"@" * 200)
 
-def opened(adapter, *, checksums=True):
-    """Return a link over which both drives have answered."""
-    link = MoteusLink(LEG, Fdcanusb(adapter.path, checksums))
-    assert whole(exchange(link))
-    return link
-
-
-@pytest.fixture(params=["like USB", "like UART"])
-def link(adapter, request):
-    """A link without the real adapter's safeguards, or with them."""
-    link = opened(adapter, checksums=request.param == "like UART")
-    yield link
+    thread = threading.Thread(target=flood, daemon=True)
+    thread.start()
+    for _ in range(3):
+        hears_nothing(link)
+    over.set()
+    while thread.is_alive():
+        hears_nothing(link)
     link.close()
 
 
-def test_both_drives_answer_in_joint_units(link, adapter):
-    result = exchange(link)
-    assert [reply.mode for reply in result.replies] == [0, 0]
-    for joint, reply in enumerate(result.replies):
-        assert reply.position == pytest.approx(adapter.robot.leg.q[joint], abs=1e-3)
-
-
-def test_a_lost_reply_costs_that_reply_and_nothing_else(link, adapter):
-    adapter.spoil = lambda number, lines: [] if number == 4 else lines
-    result = exchange(link, wait=0.5)
-    assert [reply is None for reply in result.replies] == [False, True]
-    for _ in range(3):
-        assert whole(exchange(link))
-
-
-def test_garbage_on_the_line_is_skipped_and_an_error_costs_one_tick_at_most(link, adapter):
-    for line in (b"@#!%", b"rcv", b"rcv 100", b"rcv zz 2400 E", b"rcv 100 2 E", b"OK"):
-        adapter.say(line)
-        assert whole(exchange(link)), line
-    adapter.say(b"ERR overrun")
-    exchange(link)
-    assert whole(exchange(link))
-
-
-def test_endless_noise_costs_the_deadline_and_no_more(link, adapter):
-    over = threading.Event()
-
-    def flood():
-        while not over.is_set():
-            adapter.say(b"@" * 200)
-
-    thread = threading.Thread(target=flood, daemon=True)
-    adapter.spoil = lambda number, lines: []
-    thread.start()
-    for _ in range(3):
-        assert exchange(link, wait=0.05).replies == (None, None)
-    over.set()
-    while thread.is_alive():
-        exchange(link, wait=0.05)
-    adapter.spoil = lambda number, lines: lines
-    exchange(link)
-    assert whole(exchange(link))
-
-
-def test_a_late_reply_is_not_taken_for_a_fresh_one(link, adapter):
-    held = []
-
-    def hold(number, lines):
-        if number == 4:
-            held.extend(lines)
-            return []
-        return [*held, *lines] if number == 5 else lines
-
-    adapter.spoil = hold
-    before = exchange(link, wait=0.5)
-    assert before.replies[1] is None
-    time.sleep(0.1)
-    asked = time.monotonic()
-    result = exchange(link)
-    assert [joint for joint, _ in result.late] == [1]
-    assert result.late[0][1].taken < asked - 0.05
-    assert all(reply.taken > asked - 0.05 for reply in result.replies if reply is not None)
-
-
-def test_a_closed_port_opens_again_and_a_pulled_adapter_is_silence(adapter):
-    link = opened(adapter)
+def test_a_closed_port_opens_again_and_a_pulled_adapter_is_silence(port):
+    ours, path, theirs = port
     for _ in range(2):
-        link.close()
-        link = opened(adapter)
-    adapter.pull_out()
+        MoteusLink(LEG, Fdcanusb(path)).close()
+    link = MoteusLink(LEG, Fdcanusb(path))
+    for end in (theirs, ours):
+        os.close(end)
     for _ in range(3):
-        assert exchange(link, wait=0.05).replies == (None, None)
+        hears_nothing(link)
     assert link.transport.gone
     assert "Input/output error" in link.trouble
     link.close()
-    opened(Adapter()).close()
 
 
-def test_an_adapter_that_reads_nothing_blocks_no_one(adapter):
-    link = opened(adapter)
-    adapter.reading.clear()
-    start = time.monotonic()
+def test_an_adapter_that_reads_nothing_blocks_no_one(port):
+    link, start = MoteusLink(LEG, Fdcanusb(port[1])), time.monotonic()
     for _ in range(50):
-        exchange(link, LIMP, wait=0.005)
+        hears_nothing(link, wait=0.005)
         link.send(LIMP)
-    assert time.monotonic() - start < 20
-    start = time.monotonic()
-    adapter.pull_out()
     link.close()
-    assert time.monotonic() - start < 10
+    assert time.monotonic() - start < 20
 
 
 def test_a_can_bus_without_drives_is_silence_and_named_so(monkeypatch):
     monkeypatch.setattr(drive_info, "_ANSWER_SECONDS", 0.05)
     link = MoteusLink(LEG, open_transport("virtual:empty"))
-    for _ in range(3):
-        assert exchange(link, wait=0.05).replies == (None, None)
+    hears_nothing(link)
     facts = drive_info.inspect(link)
     assert not any(drive.answers for drive in facts)
     with pytest.raises(HardwareError, match=r"id 1\) does not answer"):
@@ -246,9 +156,6 @@ def test_a_sensors_line_is_read_at_once_and_only_what_is_new_and_whole():
     sensor.close()
     with pytest.raises(HardwareError, match="Cannot open /nowhere/line"):
         SerialSensor("/nowhere/line", 115200)
-
-
-PERIOD = 0.005
 
 
 def counter(time):
