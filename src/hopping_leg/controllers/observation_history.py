@@ -12,7 +12,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, Array32, IntArray
 from hopping_leg.controllers import robot_numbers
-from hopping_leg.controllers.sample_history import RingBuffer, SampleHistory
+from hopping_leg.controllers.sample_history import SampleHistory
 from hopping_leg.errors import PolicyError, UsageError, unknown_name
 from hopping_leg.robot import Robot
 from hopping_leg.sim.channel import DELAY_DEPTH, SAMPLES, Measurement
@@ -132,14 +132,14 @@ class Dated(ObservationHistory):
     def reset(self, count: int) -> None:
         """Forget everything."""
         self._track.reset(count)
-        self._torques = RingBuffer(np.zeros((max(self.TORQUE_LAGS) + 1, count, 2)))
+        self._torques = np.zeros((max(self.TORQUE_LAGS) + 1, count, 2))
         self._command = np.zeros(count)
         self._fresh = True
 
     def restart(self, rows: IntArray | slice, measurement: Measurement) -> None:
         """Let the newest sample stand for the past of some legs."""
         self._track.fill(rows, measurement)
-        self._torques.frames[:, rows] = 0.0
+        self._torques[:, rows] = 0.0
         self._fresh = False
         self._take(measurement)
 
@@ -149,8 +149,8 @@ class Dated(ObservationHistory):
             self.restart(slice(None), measurement)
             return
         self._track.shift()
-        self._torques.shift()
-        self._torques.frames[0] = last_torque
+        self._torques[1:] = self._torques[:-1]
+        self._torques[0] = last_torque
         self._take(measurement)
 
     def _take(self, measurement: Measurement) -> None:
@@ -160,13 +160,13 @@ class Dated(ObservationHistory):
 
     def inputs(self) -> Inputs:
         """Return the chosen lags of the tracks."""
-        track, torques = self._track, self._torques.frames
+        track = self._track
         age = np.argmax(track.known[:DELAY_DEPTH], axis=0) * track.period
         return {
             "q": track.q[self._lags].swapaxes(0, 1).astype(np.float32),
             "qd": track.qd[self._lags].swapaxes(0, 1).astype(np.float32),
             "age": age[:, None].astype(np.float32),
-            "past_torque": torques[self._torque_lags].swapaxes(0, 1).astype(np.float32),
+            "past_torque": self._torques[self._torque_lags].swapaxes(0, 1).astype(np.float32),
             "command": self._command[:, None].astype(np.float32),
         }
 
@@ -174,14 +174,14 @@ class Dated(ObservationHistory):
         """Return samples, torques and command."""
         return {
             "track": self._track.state(),
-            "torques": self._torques.frames.copy(),
+            "torques": self._torques.copy(),
             "command": self._command.copy(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a ``state``."""
         self._track.restore(state["track"])
-        self._torques, self._command = RingBuffer(state["torques"]), np.array(state["command"])
+        self._torques, self._command = np.array(state["torques"]), np.array(state["command"])
         self._fresh = False
 
 

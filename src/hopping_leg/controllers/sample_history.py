@@ -1,41 +1,11 @@
 """What was measured lately, newest first, with every late sample put where it belongs in time."""
 
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from hopping_leg.arrays import Array, BoolArray, IntArray
+from hopping_leg.arrays import Array, IntArray
 from hopping_leg.sim.channel import Measurement
-
-_ROOM = 4  # length of the buffer over that of the window
-
-T = TypeVar("T", bound=np.generic)
-
-
-class RingBuffer(Generic[T]):
-    """A window of frames, (length, ...), that moves through a larger buffer: no tick moves one."""
-
-    def __init__(self, frames: npt.NDArray[T]) -> None:
-        self._length = len(frames)
-        shape = (_ROOM * self._length, *frames.shape[1:])
-        self._buffer: npt.NDArray[T] = np.empty(shape, frames.dtype)
-        self._first = len(self._buffer) - self._length
-        self.frames[:] = frames
-
-    @property
-    def frames(self) -> npt.NDArray[T]:
-        """The window, newest first; to be read and written in place, until the next shift."""
-        return self._buffer[self._first : self._first + self._length]
-
-    def shift(self) -> None:
-        """Make room for a new frame; it holds anything, and the oldest is forgotten."""
-        if self._first == 0:
-            kept = self.frames[:-1].copy()
-            self._first = len(self._buffer) - self._length
-            self.frames[1:] = kept
-        else:
-            self._first -= 1
 
 
 class SampleHistory:
@@ -50,31 +20,18 @@ class SampleHistory:
 
     def reset(self, count: int) -> None:
         """Forget everything; ``count`` legs follow."""
-        self._known = RingBuffer(np.zeros((self.length, count), np.bool_))
-        self._q = RingBuffer(np.zeros((self.length, count, 2)))
-        self._qd = RingBuffer(np.zeros((self.length, count, 2)))
-
-    @property
-    def known(self) -> BoolArray:
+        self.known = np.zeros((self.length, count), np.bool_)
         """Whether a tick's sample has arrived, (length, n)."""
-        return self._known.frames
-
-    @property
-    def q(self) -> Array:
+        self.q = np.zeros((self.length, count, 2))
         """Measured positions, rad, (length, n, 2); where unknown, what was there before."""
-        return self._q.frames
-
-    @property
-    def qd(self) -> Array:
+        self.qd = np.zeros((self.length, count, 2))
         """Measured velocities, rad/s, (length, n, 2); likewise."""
-        return self._qd.frames
 
     def shift(self) -> None:
         """Begin a tick, of which nothing is known yet."""
-        for history in (self._known, self._q, self._qd):
-            history.shift()
+        for history in (self.known, self.q, self.qd):
+            history[1:] = history[:-1]
         self.known[0] = False
-        self.q[0], self.qd[0] = self.q[1], self.qd[1]
 
     def insert(self, measurement: Measurement) -> None:
         """Put this tick's three samples in their places."""
