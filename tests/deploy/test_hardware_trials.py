@@ -210,9 +210,6 @@ def test_each_fault_ends_the_run_for_its_reason_and_nothing_starts_again(
     assert reason.lower() in [event.get("reason") for event in trace.header["events"]]
 
 
-SCHEDULE = CommandSchedule(((0.3, 1.0), (0.25, 0.5)))
-
-
 class Clock(FakeClock):
     """Moves on its own while a controller does not return."""
 

@@ -1,9 +1,8 @@
-"""What goes between the loop and the drives, and the way there; joint side, SI."""
+"""What goes between the loop and the drives, at the joints, and what motors are told; SI."""
 
 import math
 from dataclasses import dataclass
 from enum import Enum, IntEnum
-from typing import Protocol
 
 from hopping_leg.robot.parameters import Robot
 
@@ -126,22 +125,6 @@ class Exchange:
     height: float = math.nan
     clearance: float = math.nan
     """Measured base height, and the foot's above the ground that follows, m; NaN if not new."""
-
-
-class DriveLink(Protocol):
-    """The way to both drives; nothing of it ever waits beyond what the caller allows."""
-
-    def exchange(self, outgoing: DriveCommand, until: float) -> Exchange:
-        """Tell both drives what to do and ask for their state in the same frames.
-
-        Waits no longer than ``until``, s on the loop's clock.
-        """
-
-    def send(self, outgoing: DriveCommand) -> None:
-        """Tell both drives what to do; returns at once."""
-
-    def close(self) -> None:
-        """Give the adapter back."""
 
 
 @dataclass(frozen=True)

@@ -9,18 +9,21 @@ import math
 import threading
 import traceback
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hopping_leg.controllers.fallback import Fallback
 from hopping_leg.controllers.protocol import SAMPLES, Controller, Measurement
 from hopping_leg.deploy import flight_recorder, realtime, safety_limits, stop_reasons
-from hopping_leg.deploy.drive_link import BRAKE, STOP, DriveCommand, DriveLink, Exchange, Reply
+from hopping_leg.deploy.drive_link import BRAKE, STOP, DriveCommand, Exchange, Reply
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceStep
 from hopping_leg.deploy.supervisor import State, SupervisorState, supervise
 from hopping_leg.errors import ControllerError
 from hopping_leg.robot.parameters import JOINTS
+
+if TYPE_CHECKING:
+    from hopping_leg.deploy.moteus_link import MoteusLink
 
 REPLY_SHARE = 0.7
 """Share of the period after which a tick goes on without the replies that are not in."""
@@ -119,7 +122,7 @@ class ControlLoop:
 
     def __init__(
         self,
-        link: DriveLink,
+        link: "MoteusLink",
         sequence: MotionSequence,
         limits: safety_limits.SafetyLimits,
         recorder: flight_recorder.FlightRecorder,

@@ -1,4 +1,4 @@
-"""Both drives behind an adapter: a ``DriveLink`` in pure torque mode.
+"""Both drives behind an adapter, in pure torque mode.
 
 Questions and answers go to and fro in the caller's own thread, and never take longer than they may.
 What the frames say is the client library's, ``moteus``.
@@ -65,7 +65,10 @@ class MoteusLink:
         return self.transport.trouble
 
     def exchange(self, outgoing: drive_link.DriveCommand, until: float) -> drive_link.Exchange:
-        """Tell both drives what to do and ask for their state in the same frames."""
+        """Tell both drives what to do and ask for their state in the same frames.
+
+        Waits no longer than ``until``, s on the loop's clock.
+        """
         question = replies.Question(self.transforms, self._clocks, self.clock.now())
         self.transport.send(self._frames(outgoing, query=True))
         for frame in self._arriving(until):

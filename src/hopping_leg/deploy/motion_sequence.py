@@ -187,22 +187,15 @@ class MotionSequence:
             return self._squat.torque(lasted, q, qd)
         if phase is Part.DONE:
             return np.zeros(2)
-        strength = 1.0
-        if phase is Part.SETTLE:
-            target = self.poses.start
-        elif phase is Part.RISE:
-            target = _between(self._from, self.poses.start, lasted / timing.rise)
-        else:
-            target = _between(self._from, self.poses.rest, lasted / (timing.sink - timing.fade))
+        goal, way, strength = self.poses.start, 1.0, 1.0
+        if phase is Part.RISE:
+            way = lasted / timing.rise
+        elif phase is Part.SINK:
+            goal, way = self.poses.rest, lasted / (timing.sink - timing.fade)
             strength = min((timing.sink - lasted) / timing.fade, 1.0)
+        target = self._from + (goal - self._from) * kinematics.smooth_step(np.array(way))
         torque: Array = strength * np.array(gains.stiffness) * (target - q)
         return torque - np.array(gains.damping) * qd
-
-
-def _between(start: Array, end: Array, share: float) -> Array:
-    """Return the minimum-jerk path's point at a share of its time."""
-    s = min(max(share, 0.0), 1.0)
-    return start + (end - start) * (s * s * s * (10 + s * (6 * s - 15)))
 
 
 def _pair(values: Array) -> Pair:

@@ -16,13 +16,11 @@ from moteus.protocol import Writer, scale_register
 
 from hopping_leg.deploy import frames
 from hopping_leg.emulator import console
-from hopping_leg.emulator.drive import UNKNOWN_REGISTER, EmulatedDrive
+from hopping_leg.emulator.drive import EmulatedDrive
 
 _MOST = 256  # Subframes that are read: a few bytes may ask for millions of registers
+_UNKNOWN = 1  # Error code of a register that nobody knows
 _MAX_RUN = 3  # Registers whose count fits in the first byte of a subframe
-
-Errors = list[tuple[int, int]]
-"""Register and error code of each write that failed."""
 
 
 @functools.cache
@@ -60,12 +58,11 @@ class ReplyWriter:
                 half = 1 << ((8, 16, 32)[resolution] - 1)
                 self._writer.write((int(value) + half) % (2 * half) - half, resolution)
 
-    def error(self, register: int, code: int, *, reading: bool) -> None:
-        """Add the report that a register could not be read or written."""
-        kind = multiplex.READ_ERROR if reading else multiplex.WRITE_ERROR
-        self._buffer.write(bytes([kind]))
+    def unknown(self, register: int) -> None:
+        """Add the report that a register is none that can be read."""
+        self._buffer.write(bytes([multiplex.READ_ERROR]))
         self._writer.write_varuint(register)
-        self._writer.write_varuint(code)
+        self._writer.write_varuint(_UNKNOWN)
 
     def stream(self, channel: int, data: bytes) -> None:
         """Add a piece of the diagnostic stream."""
@@ -111,22 +108,17 @@ class Message:
         return means and bool(self.writes or self.reads or self.streams)
 
 
-def act(message: Message, drive: EmulatedDrive, time: float) -> Errors:
-    """Let a drive that is meant take what a message writes; return what it could not take."""
-    errors = []
+def act(message: Message, drive: EmulatedDrive, time: float) -> None:
+    """Let a drive that is meant take what a message writes."""
     for s in message.writes:
         assert s.value is not None
-        if error := drive.write(s.register, s.resolution, s.value):
-            errors.append((s.register, error))
+        drive.write(s.register, s.resolution, s.value)
     drive.commit(time)
-    return errors
 
 
-def answer(message: Message, drive: EmulatedDrive, errors: Errors) -> frames.Frame | None:
-    """Return the answer of a drive that is meant, with its failed writes; None if none is due."""
+def answer(message: Message, drive: EmulatedDrive) -> frames.Frame | None:
+    """Return the answer of a drive that is meant; None if none is due."""
     reply = ReplyWriter()
-    for register, code in errors:
-        reply.error(register, code, reading=False)
     _stream(message, drive, reply)
     _read(message, drive, reply)
     return message.frame.reply(drive.id, reply.data) if message.frame.wants_reply else None
@@ -156,7 +148,7 @@ def _read(message: Message, drive: EmulatedDrive, reply: ReplyWriter) -> None:
             reply.values(first, resolution, run)
             run = []
         if value is None:
-            reply.error(s.register, UNKNOWN_REGISTER, reading=True)
+            reply.unknown(s.register)
             continue
         if not run:
             first, resolution = s.register, s.resolution

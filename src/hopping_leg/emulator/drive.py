@@ -17,9 +17,6 @@ from hopping_leg.emulator.settings import Settings
 _AMBIENT = 30.0  # Temperature of the output stage, degrees C
 _LOWEST_VOLTAGE = 4.0  # Below it the firmware reports under-voltage, V
 
-UNKNOWN_REGISTER, NOT_WRITABLE, INVALID_VALUE = 1, 2, 3
-"""Error codes of reads and writes."""
-
 
 @dataclass
 class Disturbances:
@@ -104,26 +101,16 @@ class EmulatedDrive:
         self.machine, self.command = mode_machine.ModeMachine(), torque_law.Command()
         self.uptime = 0.0
 
-    def write(self, register: int, resolution: int, value: float) -> int:
-        """Take one register from the host; return 0 or an error code."""
+    def write(self, register: int, resolution: int, value: float) -> None:
+        """Take one register from the host; one that cannot be written stays as it is."""
         scaled = value if resolution == F32 else scale_register(register, resolution, value)
-        if register == Register.MODE:
-            return self._write_mode(int(scaled))
-        if register in torque_law.COMMAND_FIELDS:
+        if register == Register.MODE and int(scaled) in mode_machine.MODES:
+            self.command = torque_law.Command(DriveMode(int(scaled)))
+            self._commanded = True
+        elif register in torque_law.COMMAND_FIELDS:
             setattr(self.command, torque_law.COMMAND_FIELDS[register], float(scaled))
         elif register == Register.SET_OUTPUT_NEAREST:
             self.encoder.set_nearest(float(scaled))
-        else:
-            known = register in self.true_state() or register in self.identity
-            return NOT_WRITABLE if known else UNKNOWN_REGISTER
-        return 0
-
-    def _write_mode(self, mode: int) -> int:
-        if mode not in mode_machine.MODES:
-            return INVALID_VALUE
-        self.command = torque_law.Command(DriveMode(mode))
-        self._commanded = True
-        return 0
 
     def commit(self, time: float) -> None:
         """Act on a frame's mode write, once all its registers are written."""

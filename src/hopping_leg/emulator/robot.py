@@ -109,8 +109,9 @@ class EmulatedRobot:
         for joint, drive in enumerate(self.drives):
             if not message.is_for(drive):
                 continue
-            errors = [] if late else bus.act(message, drive, self.time)
-            answer = bus.answer(message, drive, errors)
+            if not late:
+                bus.act(message, drive, self.time)
+            answer = bus.answer(message, drive)
             if self.observer is not None:
                 self.observer.record(self.time, joint, message, answer)
             if answer is not None:
