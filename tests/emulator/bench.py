@@ -1,72 +1,17 @@
 """An emulated robot on the bench: the client library's commands, time moved by hand."""
 
-import asyncio
 import dataclasses
 import math
 
 import moteus
 import numpy as np
-from moteus.transport_device import Frame as ClientFrame
-from moteus.transport_device import TransportDevice
 
-from hopping_leg.deploy.frames import Frame, padded
+from hopping_leg.deploy.frames import REPLY_WANTED, Frame, padded
 from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.model_mismatch import SensorMismatch
 
 R = moteus.Register
-
-
-class MemoryTransport(TransportDevice):
-    """A device whose transactions take no time; replies that are late or lost stay away."""
-
-    def __init__(self, robot):
-        super().__init__()
-        self.robot = robot
-
-    def empty_bus_tx_safe(self):
-        """Return True: anything may be sent."""
-        return True
-
-    async def send_frame(self, frame):
-        """Send a frame; replies go to the receive queue."""
-        self._send(frame)
-        for reply in self._replies():
-            await self._handle_received_frame(reply)
-
-    async def transaction(self, requests, **_):
-        """Send requests; each gets the first reply that it waits for and that has arrived."""
-        for request in requests:
-            self._send(request.frame)
-        for reply in self._replies():
-            for request in requests:
-                wants = request.frame_filter is not None and request.frame_filter(reply)
-                if wants and not request.responses:
-                    request.responses.append(reply)
-                    break
-            else:
-                await self._handle_received_frame(reply)
-
-    def _send(self, frame):
-        if self.robot.plugged:
-            self.robot.receive(Frame(frame.arbitration_id, padded(bytes(frame.data))))
-
-    def _replies(self):
-        """Return what arrives now; a CAN controller discards what was corrupted."""
-        items = self.robot.reply_queue.take(self.robot.time)
-        return [
-            ClientFrame(
-                arbitration_id=item.frame.arbitration_id,
-                data=item.frame.data,
-                dlc=len(item.frame.data),
-                is_extended_id=item.frame.extended,
-                is_fd=True,
-                bitrate_switch=True,
-                channel=self,
-            )
-            for item in items
-            if item.frame is not None and item.flip < 0 and self.robot.plugged
-        ]
 
 
 def exact(robot):
@@ -80,13 +25,16 @@ def exact(robot):
 
 
 class Bench:
-    """Two drives and their leg, asked through the unmodified client."""
+    """Two drives and their leg, asked in the unmodified client's words.
+
+    ``strays`` are frames that nobody waited for.
+    """
 
     def __init__(self, q=(0.6, -1.3), robot="legv2", **options):
         loaded = exact(load_robot(robot) if isinstance(robot, str) else robot)
         self.robot = EmulatedRobot(loaded, np.array(q), **options)
-        self.transport = moteus.Transport([MemoryTransport(self.robot)])
-        self.drives = [moteus.Controller(id=n, transport=self.transport) for n in (1, 2)]
+        self.drives = [moteus.Controller(id=n, transport=False) for n in (1, 2)]
+        self.strays = []
 
     def wait(self, seconds):
         self.robot.advance(self.robot.time + seconds)
@@ -97,9 +45,25 @@ class Bench:
         self.wait(seconds)
 
     def cycle(self, *commands):
-        return asyncio.run(self.transport.cycle(list(commands)))
-
-    run = staticmethod(asyncio.run)
+        """Send commands; return what the first reply says that each waits for and has arrived."""
+        waiting, results = [], []
+        for command in commands if self.robot.plugged else ():
+            number = command.destination | command.source << 8
+            asked = Frame(
+                number | REPLY_WANTED * command.reply_required, padded(bytes(command.data))
+            )
+            self.robot.receive(asked)
+            waiting += [(asked, command)] * command.reply_required
+        for item in self.robot.reply_queue.take(self.robot.time):
+            if item.frame is None or item.flip >= 0 or not self.robot.plugged:
+                continue  # a CAN controller discards what was corrupted
+            wants = [pair for pair in waiting if item.frame.answers(pair[0])]
+            if wants:
+                waiting.remove(wants[0])
+                results.append(wants[0][1].parse(item.frame))
+            else:
+                self.strays.append(item.frame)
+        return results
 
     def torque(self, *torques, watchdog=1.0, maximum=20.0, **more):
         """Command pure torques; return the replies."""

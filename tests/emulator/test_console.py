@@ -1,4 +1,3 @@
-import moteus
 import pytest
 
 from tests.emulator.bench import Bench
@@ -10,18 +9,16 @@ def bench():
 
 
 def console(bench, *lines):
-    """Send lines through the client's stream; return the answers."""
-
-    async def talk():
-        stream = moteus.Stream(bench.drives[0], use_flow_control=False)
-        await stream.write_message(b"tel stop")
-        await stream.flush_read(timeout=0.02)
-        return [
-            await stream.command(line.encode(), allow_any_response=any_) for line, any_ in asked
-        ]
-
-    asked = [(line, line.startswith("conf get")) for line in lines]
-    return [answer.decode() for answer in bench.run(talk())]
+    """Send lines in the client's frames; return the answers."""
+    drive, text = bench.drives[0], b""
+    for line in lines:
+        said = f"{line}\n".encode()
+        for begin in range(0, len(said), drive.max_diagnostic_write):
+            piece = said[begin : begin + drive.max_diagnostic_write]
+            bench.cycle(drive.make_diagnostic_write(piece))
+    while (answer := bench.cycle(drive.make_diagnostic_read())[0]).data:
+        text += answer.data
+    return text.decode().splitlines()
 
 
 def test_settings_are_read_set_and_kept(bench):
@@ -39,8 +36,8 @@ def test_settings_are_read_set_and_kept(bench):
 
 @pytest.mark.parametrize(
     "line",
-    ["conf set servo.nonsense 1", "conf set id.id x", "hello"],
+    ["conf set servo.nonsense 1", "conf get servo.nonsense", "conf set id.id x", "hello"],
 )
-def test_nonsense_is_an_error_that_the_client_raises(bench, line):
-    with pytest.raises(moteus.moteus.CommandError, match="ERR"):
-        console(bench, line)
+def test_nonsense_is_an_error(bench, line):
+    (answer,) = console(bench, line)
+    assert answer.startswith("ERR")

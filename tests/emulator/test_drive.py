@@ -138,7 +138,7 @@ def test_power_up_finds_the_output_within_a_turn_of_the_rotor_only():
         assert home == 1
         assert abs(position) <= 1 / 12 + 1e-9
         assert (position - truth) * 6 == pytest.approx(round((position - truth) * 6), abs=1e-5)
-        bench.run(bench.drives[0].set_output_nearest(position=truth + 0.05))
+        bench.cycle(bench.drives[0].make_set_output_nearest(position=truth + 0.05))
         assert bench.read(R.POSITION) == pytest.approx(truth, abs=1e-6)
         assert bench.read(R.HOME_STATE) == 2
 

@@ -51,8 +51,7 @@ def test_silence_lasts_as_long_as_it_says():
 def test_a_late_or_second_reply_arrives_when_nobody_waits_for_it(fault, stray, alone):
     bench, ticks = hopping(fault)
     assert answers(ticks).count(1) == alone
-    strays = bench.transport.devices()[0]._receive_queue
-    assert [frame.arbitration_id >> 8 & 0x7F for frame in strays] == [stray]
+    assert [frame.source for frame in bench.strays] == [stray]
 
 
 @pytest.mark.parametrize("checksums", [True, False])
