@@ -16,7 +16,7 @@ from collections import deque
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from hopping_leg.robot.parameters import JOINTS
 
 if TYPE_CHECKING:
     from hopping_leg.emulator.drive import EmulatedDrive
-    from hopping_leg.emulator.robot import EmulatedRobot
+    from hopping_leg.emulator.leg import EmulatedLeg
 
 KINDS: "dict[str, type[FaultKind]]" = {}
 """Every kind that a script may name."""
@@ -93,6 +93,23 @@ class Fault:
         return (0, 1) if self.drive == "both" else (JOINTS.index(self.drive),)
 
 
+class FaultyRobot(Protocol):
+    """What faults change."""
+
+    time: float  # s
+    plugged: bool
+    """Whether the adapter is plugged in."""
+    leg: "EmulatedLeg"
+    reply_queue: reply_queue.TimedQueue[reply_queue.QueuedReply]
+
+    @property
+    def drives(self) -> "tuple[EmulatedDrive, ...]":
+        """Hip and knee."""
+
+    def rewire(self, joint: int, ratio: float) -> None:
+        """Let a drive believe that its joint turns so many times as far as it does."""
+
+
 @dataclass
 class Delivery:
     """How a drive's reply reaches the host."""
@@ -126,7 +143,7 @@ class FaultKind:
         if kind:
             KINDS[kind] = cls
 
-    def __init__(self, fault: Fault, robot: "EmulatedRobot", rng: np.random.Generator) -> None:
+    def __init__(self, fault: Fault, robot: FaultyRobot, rng: np.random.Generator) -> None:
         self.fault, self.robot, self.rng = fault, robot, rng
         self.begun = robot.time
         self.replies_left = math.inf

@@ -19,9 +19,6 @@ _MOST_SHIFT = 0.06
 """Largest correction of a command, over the leg's length."""
 
 
-_ARRAYS = ("observations", "labels", "weights", "hidden", "valid", "memory")
-
-
 class LabelledRollout(NamedTuple):
     """Some control periods of n environments."""
 
@@ -66,64 +63,60 @@ class RolloutBuffer:
     def __init__(
         self, rollouts: int, ticks: int, count: int, size: int, memory: int, hidden: int = 0
     ) -> None:
-        shape = (max(rollouts, 1), ticks, count)
-        self._observations = torch.zeros((*shape, size), dtype=torch.float16)
-        self._labels = torch.zeros((*shape, 2), dtype=torch.float16)
-        self._weights = torch.zeros(shape, dtype=torch.float16)
-        self._hidden = torch.zeros((*shape, hidden), dtype=torch.float16)
-        self._valid = torch.zeros(shape, dtype=torch.bool)
-        self._memory = torch.zeros((shape[0], count, memory))
+        shape, half = (max(rollouts, 1), ticks, count), torch.float16
+        self._arrays = {
+            "observations": torch.zeros((*shape, size), dtype=half),
+            "labels": torch.zeros((*shape, 2), dtype=half),
+            "weights": torch.zeros(shape, dtype=half),
+            "hidden": torch.zeros((*shape, hidden), dtype=half),
+            "valid": torch.zeros(shape, dtype=torch.bool),
+            "memory": torch.zeros((shape[0], count, memory)),
+        }
         self.added = 0
         """Rollouts added so far."""
 
     @property
     def filled(self) -> int:
         """Rollouts held."""
-        return min(self.added, len(self._labels))
+        return min(self.added, len(self._arrays["valid"]))
 
     def add(self, rollout: LabelledRollout) -> None:
         """Keep a rollout in the place of the oldest."""
-        place = self.added % len(self._labels)
+        place = self.added % len(self._arrays["valid"])
         later = rollout.begun.copy()
         later[0] = False
-        self._observations[place] = torch.from_numpy(rollout.observations)
-        self._labels[place] = torch.from_numpy(rollout.labels)
-        self._weights[place] = torch.from_numpy(rollout.weights)
-        self._hidden[place] = torch.from_numpy(rollout.hidden)
-        self._valid[place] = torch.from_numpy(~np.logical_or.accumulate(later))
-        self._memory[place] = torch.from_numpy(rollout.memory * ~rollout.begun[0][:, None])
+        memory = rollout.memory * ~rollout.begun[0][:, None]
+        new = rollout._asdict() | {"valid": ~np.logical_or.accumulate(later), "memory": memory}
+        for name, array in self._arrays.items():
+            array[place] = torch.from_numpy(new[name])
         self.added += 1
 
     def ticks(self, count: int, generator: torch.Generator) -> Batch:
         """Return ``count`` ticks at random."""
-        rows = torch.randint(self.filled * self._valid[0].numel(), (count,), generator=generator)
-        parts = (self._observations, self._labels, self._weights[..., None], self._hidden)
-        seen, labels, weights, hidden = (part.flatten(0, 2)[rows].float() for part in parts)
-        return Batch(seen, labels, weights[:, 0], hidden, self._memory[0, :0])
+        seen, labels, weights, hidden, valid, memory = self._arrays.values()
+        rows = torch.randint(self.filled * valid[0].numel(), (count,), generator=generator)
+        parts = (part.flatten(0, 2)[rows].float() for part in (seen, labels, weights, hidden))
+        return Batch._make([*parts, memory[0, :0]])
 
     def sequences(self, count: int, generator: torch.Generator) -> Batch:
         """Return a rollout at random, of as many environments as give ``count`` ticks."""
         place = int(torch.randint(self.filled, (), generator=generator))
-        ticks, legs = self._valid[place].shape
+        seen, labels, weights, hidden, valid, memory = (a[place] for a in self._arrays.values())
+        ticks, legs = valid.shape
         chosen = torch.randperm(legs, generator=generator)[: max(1, count // ticks)]
-        return Batch(
-            self._observations[place][:, chosen].float(),
-            self._labels[place][:, chosen].float(),
-            (self._weights[place] * self._valid[place])[:, chosen].float(),
-            self._hidden[place][:, chosen].float(),
-            self._memory[place][chosen],
-        )
+        parts = (part[:, chosen].float() for part in (seen, labels, weights * valid, hidden))
+        return Batch._make([*parts, memory[chosen]])
 
     def state(self) -> Tree:
         """Return everything that is held."""
-        arrays = {name: getattr(self, f"_{name}")[: self.filled].numpy() for name in _ARRAYS}
+        arrays = {name: array[: self.filled].numpy() for name, array in self._arrays.items()}
         return {"added": self.added, **arrays}
 
     def restore(self, state: Tree) -> None:
         """Go on from a ``state``."""
         self.added = state["added"]
-        for name in _ARRAYS:
-            getattr(self, f"_{name}")[: self.filled] = torch.from_numpy(state[name])
+        for name, array in self._arrays.items():
+            array[: self.filled] = torch.from_numpy(state[name])
 
 
 @dataclass(frozen=True)
