@@ -7,7 +7,6 @@ from hopping_leg.hop_detection import (
     count_skipped,
     find_bounces,
     find_hops,
-    hop_period,
     measure_hops,
 )
 
@@ -79,5 +78,4 @@ def test_a_bounce_in_a_long_gap_is_one_skipped_hop():
 
 def test_a_leg_that_never_hops_skips_at_the_usual_period():
     none = np.empty(0, dtype=int)
-    assert hop_period(none, RATE) == USUAL_PERIOD
     assert count_skipped(none, none, 0, 2000, RATE) == 2000 / RATE / USUAL_PERIOD

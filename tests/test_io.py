@@ -48,7 +48,7 @@ WHOLE = {"name": "x", "inner": {}}
 
 def test_a_dataclass_comes_back_from_its_table():
     outer = Outer("x", Inner("high", 2.5), (1.0, 2.0))
-    tree = json.loads(io.json_text(dataclasses.asdict(outer)))
+    tree = json.loads(json.dumps(dataclasses.asdict(outer)))
     assert io.read_dataclass(Outer, tree, "f") == outer
 
 

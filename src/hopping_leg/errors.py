@@ -51,11 +51,7 @@ class HardwareError(HoppingLegError):
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> str:
     """Return the sentence for a name that does not exist, with the valid ones."""
     names = sorted(valid)
-    hint = "".join(f" Did you mean '{near}'?" for near in nearest_names(name, names))
+    lower = {one.lower(): one for one in names}
+    near = get_close_matches(name.lower(), lower, n=1)
+    hint = f" Did you mean '{lower[near[0]]}'?" if near else ""
     return f"There is no {kind} '{name}'.{hint} Available: {', '.join(names)}."
-
-
-def nearest_names(name: str, valid: Iterable[str]) -> list[str]:
-    """Return the valid name of the nearest letters, or none."""
-    names = {one.lower(): one for one in valid}
-    return [names[one] for one in get_close_matches(name.lower(), names, n=1)]

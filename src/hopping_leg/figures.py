@@ -96,8 +96,3 @@ def encode(figure: Figure, kind: Literal["svg", "pdf", "png"], dpi: float = 160)
     with mpl.rc_context({**_LOOK, "pdf.fonttype": 42}):  # embeds the fonts
         figure.savefig(buffer, format=kind, dpi=dpi, metadata=dates[kind])
     return buffer.getvalue()
-
-
-def to_svg(figure: Figure) -> bytes:
-    """Return a figure as SVG."""
-    return encode(figure, "svg")

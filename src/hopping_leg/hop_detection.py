@@ -24,7 +24,7 @@ SKIP_RATIO = 1.6
 """A gap between apexes longer than this many median periods holds a skipped hop."""
 
 USUAL_PERIOD = 0.5
-"""Period assumed where a run has too few hops to tell its own, s."""
+"""Period assumed where a run has less than three hops, s."""
 
 
 @dataclass(frozen=True)
@@ -102,13 +102,6 @@ def find_bounces(height: Array, clearance: Array) -> IntArray:
     return grounded
 
 
-def hop_period(apex_tick: IntArray, rate: float) -> float:
-    """Return the median time between successive hops, s; ``USUAL_PERIOD`` below three hops."""
-    if len(apex_tick) < 3:
-        return USUAL_PERIOD
-    return float(np.median(np.diff(apex_tick))) / rate
-
-
 def count_skipped(
     apex_tick: IntArray, bounce_tick: IntArray, start: int, end: int, rate: float
 ) -> int:
@@ -121,7 +114,7 @@ def count_skipped(
 
     Indices of apexes rise; ``end`` is one past the last tick of the window.
     """
-    period = hop_period(apex_tick, rate) * rate
+    period = np.median(np.diff(apex_tick)) if len(apex_tick) > 2 else USUAL_PERIOD * rate
     edges = np.concatenate([[start], apex_tick, [end]])
     periods = np.diff(edges) / period
     apexes = np.round(periods) - 1

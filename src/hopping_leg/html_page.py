@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from hopping_leg.figures import to_svg
+from hopping_leg.figures import encode
 
 
 def page_template(package: str, name: str) -> Template:
@@ -36,7 +36,7 @@ def data_uri(content: bytes, kind: str) -> str:
 
 def svg_uri(figure: Figure) -> str:
     """Return a figure as an address that carries it."""
-    return data_uri(to_svg(figure), "image/svg+xml")
+    return data_uri(encode(figure, "svg"), "image/svg+xml")
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Column:
 
 
 _TABLE = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from_string("""\
-<div class="wide"><table><caption>{{ caption }}</caption>
+<div class="wide"><table>
 <tr>{% for c in columns %}<th>{{ unbroken(c.heading) }}</th>{% endfor %}</tr>
 {% for row in rows %}
 <tr class="{{ 'first' if loop.changed(columns[0].text(row)) }}">
@@ -59,10 +59,9 @@ _TABLE = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from
 </table></div>""")
 
 
-def table(columns: Sequence[Column], rows: Sequence[Any], caption: str = "") -> Markup:
+def table(columns: Sequence[Column], rows: Sequence[Any]) -> Markup:
     """Return an HTML table; a line sets off where the first column changes."""
-    shown = {"columns": columns, "rows": rows, "caption": caption, "unbroken": _unbroken}
-    return Markup(_TABLE.render(shown) if rows else "")
+    return Markup(_TABLE.render(columns=columns, rows=rows, unbroken=_unbroken) if rows else "")
 
 
 def _unbroken(heading: str) -> str:

@@ -50,13 +50,9 @@ def write_atomically(path: Path, content: bytes) -> None:
 
 
 def write_json(path: Path, value: object) -> None:
-    """Write a value as readable JSON, as ``write_atomically`` does."""
-    write_atomically(path, json_text(value).encode())
-
-
-def json_text(value: object) -> str:
-    """Return a value as readable JSON, see ``plain``."""
-    return f"{json.dumps(plain(value), indent=1, allow_nan=False)}\n"
+    """Write a value as readable JSON, see ``plain``, as ``write_atomically`` does."""
+    text = json.dumps(plain(value), indent=1, allow_nan=False)
+    write_atomically(path, f"{text}\n".encode())
 
 
 _MOST_DIGITS = 300

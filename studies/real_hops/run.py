@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import statistics
-from hopping_leg.figures import COLOURS, WIDTH, styled, to_svg
+from hopping_leg.figures import COLOURS, WIDTH, encode, styled
 from hopping_leg.io import replace_at, write_atomically
 from hopping_leg.robot import Robot, load_robot
 from studies.real_hops.recorded import RIGS, Hop, load_hops
@@ -208,5 +208,5 @@ class RealHops:
         columns = ("apex_mean_m", "apex_rms_m", "speed_mean_m_s", "push_mean_s", "flight_mean_s")
         show_rows(result["rows"], "rig", "robot", "drive", *columns)
         if self.figure is not None:
-            write_atomically(self.figure, to_svg(figure(shown)))
+            write_atomically(self.figure, encode(figure(shown), "svg"))
         return result

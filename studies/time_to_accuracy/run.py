@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from hopping_leg.cli.options import JsonFile
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.evaluate.runner import software_versions
-from hopping_leg.figures import controller_colours, panels, styled, to_svg
+from hopping_leg.figures import controller_colours, encode, panels, styled
 from hopping_leg.io import write_atomically
 from hopping_leg.rl.policy_evaluation import CommandResult, evaluate_policy
 from hopping_leg.rl.recipes import RECIPES
@@ -70,7 +70,7 @@ class TimeToAccuracy:
         lengths = ("mean_error_m", "worst_seed_mean_error_m", "mean_std_m")
         show_rows(summary, "recipe", "seconds", *lengths, "skipped_hops")
         if self.figure is not None:
-            write_atomically(self.figure, to_svg(draw(rows)))
+            write_atomically(self.figure, encode(draw(rows), "svg"))
         return {
             "robots": {name: self._robot(name).name for name in self.recipes},
             "rows": rows,

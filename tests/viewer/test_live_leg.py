@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.errors import RobotError, UsageError
+from hopping_leg.hop_detection import COLUMNS, find_hops
 from hopping_leg.robot import GroundMismatch, load_robot
 from hopping_leg.viewer.live_leg import LiveSettings, LiveSimulation, default_settings
 
@@ -27,7 +28,8 @@ def heights(live, leg=0):
 
 
 def last_apexes(live, leg=0, seconds=1.5):
-    return live.tracks[leg].apexes(live.now, seconds)
+    rows = [live.tracks[leg].field(name)[-round(seconds * 200) :] for name in COLUMNS]
+    return find_hops(*rows).apex
 
 
 def test_the_leg_hops_to_what_is_commanded_while_it_runs():

@@ -28,7 +28,7 @@ import tyro
 from hopping_leg import io
 from hopping_leg.cli import COMMAND, options
 from hopping_leg.robot import CONTROL_RATE, TIMESTEP, SoftLimits, load_robot
-from hopping_leg.terminal import Progress, plain_console
+from hopping_leg.terminal import Progress
 
 if TYPE_CHECKING:
     from hopping_leg.controllers import RolloutConfig
@@ -110,7 +110,7 @@ def _paper(
     judged = _judge(entries, setup, args)
     notes = [*notes, *judged.evaluation.notes]
     evaluation = replace(judged.evaluation, command=COMMAND.get(), notes=notes)
-    tables.print_evaluation(plain_console(), evaluation)
+    tables.print_evaluation(evaluation)
     if predictions := evaluation.predictions:
         options.show_table(*prediction.shown(predictions))
     numbers, report, traces = args.json, None, args.traces
@@ -158,7 +158,7 @@ def _robustness(args: Evaluate, entries: "list[Entry]", setup: "RolloutConfig") 
     from hopping_leg.evaluate import figures, tables, trials
     from hopping_leg.evaluate.robustness import Suite, run_suite
     from hopping_leg.evaluate.robustness_axes import axes_named
-    from hopping_leg.figures import to_svg
+    from hopping_leg.figures import encode
 
     out = args.out or Path("runs/robustness")
     heights = trials.choose_commands(setup.robot, args.commands, args.seeds)
@@ -166,7 +166,7 @@ def _robustness(args: Evaluate, entries: "list[Entry]", setup: "RolloutConfig") 
     with Progress(parts=len(entries)) as bar:
         result = {"command": COMMAND.get(), **run_suite(entries, suite, bar.show)}
     file, figure = args.json or out / "robustness.json", out / "robustness.svg"
-    tables.print_robustness(plain_console(), result)
+    tables.print_robustness(result)
     options.save_json(file, result)
-    io.write_atomically(figure, to_svg(figures.draw_robustness(result)))
+    io.write_atomically(figure, encode(figures.draw_robustness(result), "svg"))
     options.say_written(file, figure)

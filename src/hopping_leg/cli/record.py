@@ -209,18 +209,15 @@ def _simulated(
 
     with Progress(parts=len(excitations)) as bar:
         for number, (stem, excitation) in enumerate(excitations.items()):
-            yield (
-                stem,
-                play(
-                    excitation,
-                    robot,
-                    believed=believed,
-                    seed=args.seed + number,
-                    gains=gains,
-                    timestep=args.timestep,
-                    on_tick=partial(lambda stem, done, ticks: bar.show(stem, done / ticks), stem),
-                ),
-            )
+
+            def show(done: int, ticks: int, stem: str = stem) -> None:
+                bar.show(stem, done / ticks)
+
+            played = play(
+                excitation, robot, believed=believed, seed=args.seed + number, gains=gains,
+                timestep=args.timestep, on_tick=show,
+            )  # fmt: skip
+            yield stem, played
 
 
 def _measured(

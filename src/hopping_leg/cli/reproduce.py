@@ -23,7 +23,7 @@ from hopping_leg import io
 from hopping_leg.cli import options
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import Robot, load_robot
-from hopping_leg.terminal import Progress, plain_console
+from hopping_leg.terminal import Progress
 
 if TYPE_CHECKING:
     from hopping_leg.evaluate import EvaluationRun
@@ -94,7 +94,7 @@ def run(args: Reproduce) -> None:
         notes,
     )
     options.say(f"On {twin.name}:")
-    tables.print_evaluation(plain_console(), judged)
+    tables.print_evaluation(judged)
     options.say(
         *notes,
         f"Reports: {folder / 'transfer.html'} and {folder / 'report.html'}",

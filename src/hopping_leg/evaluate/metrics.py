@@ -8,7 +8,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate import motor_load
-from hopping_leg.hop_detection import COLUMNS, measure_hops, trace_hops
+from hopping_leg.hop_detection import COLUMNS, measure_hops
 from hopping_leg.trace import Trace
 
 START_SECONDS = 2.0  # in which hops are dropped after the standing start
@@ -120,22 +120,3 @@ def pooled_apexes(windows: Sequence[HopWindow]) -> Array:
 
 ESTIMATED_APEX = "estimated_apex_m"
 """Trace column: height of the last apex as estimated after its flight, m."""
-
-
-def apex_errors(trace: Trace) -> Array:
-    """Return estimated minus true apex of every hop that the controller noticed, m, (hops,).
-
-    A controller corrects its apex after touchdown: its next value after a true apex is that hop's.
-    """
-    if ESTIMATED_APEX not in trace.table.columns:
-        return np.empty(0)
-    estimate = trace.column(ESTIMATED_APEX)
-    hops = trace_hops(trace)
-    ends = np.append(hops.tick, len(estimate))[1:]
-    settled = trace.column("time_s")[hops.tick] >= START_SECONDS
-    errors = []
-    for start, end, apex, counts in zip(hops.tick, ends, hops.apex, settled, strict=True):
-        changes = np.flatnonzero(np.diff(estimate[start:end]))
-        if counts and len(changes):
-            errors.append(estimate[start + changes[0] + 1] - apex)
-    return np.array(errors)

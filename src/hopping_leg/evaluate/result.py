@@ -37,12 +37,8 @@ class Summary(MotorLoad):
     """Median of |apex - command|, misses included."""
     mean_abs_error_m: float
     """Mean of |apex - command|, misses included."""
-    mean_abs_error_low_m: float
-    mean_abs_error_high_m: float
     std_m: float
     """Hop-to-hop standard deviation of the apex."""
-    std_low_m: float
-    std_high_m: float
     iqr_m: float
     """Interquartile range of the apex."""
     hops: int
@@ -88,8 +84,6 @@ class Evaluation:
 
     summary: list[Summary]
     """One row per controller and command: fixed trials and the sequence pooled."""
-    sequence: list[Summary]
-    """The sequence alone."""
     ladder: list[Summary]
     staircase: list[Staircase]
     neighbours: list[dict[str, Any]]
@@ -142,18 +136,17 @@ def tabulate(runs: Sequence[Run], seed: int, robot: Robot | None = None) -> Eval
                 found[run.controller].setdefault(window.command, []).append((run, window))
         return found
 
-    def rows(*kinds: str) -> list[Summary]:
+    def rows(shown: dict[str, Windows]) -> list[Summary]:
         return [
             summarise(name, at, [window for _, window in found], seed, robot)
-            for name, own in windows(*kinds).items()
+            for name, own in shown.items()
             for at, found in own.items()
         ]
 
     pooled = windows("fixed", "sequence")
     return Evaluation(
-        summary=rows("fixed", "sequence"),
-        sequence=rows("sequence"),
-        ladder=rows("ladder"),
+        summary=rows(pooled),
+        ladder=rows(windows("ladder")),
         staircase=[_staircase(name, own) for name, own in windows("staircase").items() if own],
         neighbours=[
             {"controller": name, "neighbours": _compare(own, seed)} for name, own in pooled.items()
@@ -217,8 +210,7 @@ def summarise(
     load = motor_load(parts, robot) if robot else unknown()
     apex, errors = metrics.pooled_apexes(windows), metrics.errors_of(windows)
     every = np.concatenate(errors)
-    low, high = statistics.bootstrap(errors, _centre, seed)
-    spread = statistics.bootstrap([w.apex for w in windows if len(w.apex)], _spread, seed)
+    low, high = statistics.median_interval(errors, seed)
     settled = sum(w.settled for w in windows)
     per_second = 1 / settled if settled else float("nan")
     quartiles = np.percentile(apex, [25, 75]) if len(apex) else np.full(2, np.nan)
@@ -229,15 +221,11 @@ def summarise(
         robot=str(parts[0].header.get("robot", "")),
         command_m=command,
         median_error_m=float(np.median(every)),
-        median_error_low_m=float(low[0]),
-        median_error_high_m=float(high[0]),
+        median_error_low_m=low,
+        median_error_high_m=high,
         median_abs_error_m=float(np.median(np.abs(every))),
         mean_abs_error_m=float(np.abs(every).mean()),
-        mean_abs_error_low_m=float(low[1]),
-        mean_abs_error_high_m=float(high[1]),
         std_m=statistics.of(np.std, apex),
-        std_low_m=float(spread[0]),
-        std_high_m=float(spread[1]),
         iqr_m=float(quartiles[1] - quartiles[0]),
         hops=len(apex),
         skipped_hops=sum(w.skipped for w in windows),
@@ -256,13 +244,3 @@ def summarise(
         missed_runs=sum(not len(w.apex) for w in windows),
         **vars(load),
     )
-
-
-def _centre(errors: list[Array]) -> tuple[float, float]:
-    """Return median and mean distance, m, of some runs' errors."""
-    every = np.concatenate(errors)
-    return float(np.median(every)), float(np.abs(every).mean())
-
-
-def _spread(apexes: list[Array]) -> float:
-    return statistics.of(np.std, np.concatenate(apexes)) if apexes else float("nan")

@@ -10,12 +10,11 @@ from typing import Any
 
 from markupsafe import Markup
 from rich import box
-from rich.console import Console
 from rich.table import Table
 
 from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.html_page import Column, table
-from hopping_leg.terminal import print_table
+from hopping_leg.terminal import plain_console, print_table
 
 Row = dict[str, Any]
 _NARROW = 7  # characters of a heading on a line of the terminal
@@ -132,20 +131,20 @@ def verdict(evaluation: Evaluation, controller: str) -> str:
     return f"{'; '.join(parts)}."
 
 
-def print_evaluation(console: Console, evaluation: Evaluation) -> None:
+def print_evaluation(evaluation: Evaluation) -> None:
     """Print notes, the summary and a verdict on every controller."""
-    _print_notes(console, evaluation.notes)
+    _print_notes(evaluation.notes)
     for one in filter(None, (evaluation, evaluation.secondary)):
         c = one.conditions
         title = f"On {c['robot']}, {c['floor']} floor, {c['seeds']} seeds from {c['seed']}:"
-        _print_table(console, title, SHORT, one.to_json()["summary"])
+        _print_table(title, SHORT, one.to_json()["summary"])
     for name in evaluation.controllers:
-        console.print(f"{name} {verdict(evaluation, name)}")
+        plain_console().print(f"{name} {verdict(evaluation, name)}")
 
 
-def print_robustness(console: Console, result: Row) -> None:
+def print_robustness(result: Row) -> None:
     """Print notes and the scores on every axis."""
-    _print_notes(console, result["notes"])
+    _print_notes(result["notes"])
     c = result["conditions"]
     rows: dict[str, Row] = {}
     for score in result["scores"]:
@@ -158,20 +157,18 @@ def print_robustness(console: Console, result: Row) -> None:
         f" {c['seeds']} seeds from {c['seed']}."
     )
     names = next(iter(rows.values()))
-    _print_table(console, title, [_column(name) for name in names], list(rows.values()))
+    _print_table(title, [_column(name) for name in names], list(rows.values()))
 
 
-def _print_notes(console: Console, notes: Sequence[str]) -> None:
+def _print_notes(notes: Sequence[str]) -> None:
     """Print what a reader must know before any table."""
     for note in notes:
-        console.print(f"Note: {note}")
+        plain_console().print(f"Note: {note}")
 
 
-def _print_table(
-    console: Console, title: str, columns: Sequence[Column], rows: Sequence[Row]
-) -> None:
+def _print_table(title: str, columns: Sequence[Column], rows: Sequence[Row]) -> None:
     """Print a table under a sentence, within 80 columns where names allow."""
-    console.print(title)
+    plain_console().print(title)
     shown = Table(box=box.SIMPLE_HEAD, padding=0)
     shown.add_column(columns[0].heading, min_width=14)
     for column in columns[1:]:
@@ -180,4 +177,4 @@ def _print_table(
         )
     for row in rows:
         shown.add_row(*(column.text(row) for column in columns))
-    print_table(shown, console)
+    print_table(shown)

@@ -8,14 +8,7 @@ from hopping_leg.controllers import command_schedule, protocol, registry
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import Robot, SoftLimits, load_robot
-from hopping_leg.sim import (
-    CONTROL_RATE,
-    NO_NOISE,
-    LegSimulator,
-    Measurement,
-    NoiseAndDelay,
-    Plant,
-)
+from hopping_leg.sim import CONTROL_RATE, NO_NOISE, LegSimulator, Measurement, NoiseAndDelay, Plant
 from hopping_leg.viewer.tracks import FIELDS, KEPT, MOST, Track
 
 PUSH_SECONDS = 0.05
@@ -88,11 +81,7 @@ class LiveSimulation:
     """
 
     def __init__(
-        self,
-        controllers: tuple[str, ...],
-        robot: str,
-        height: float,
-        seed: int = 0,
+        self, controllers: tuple[str, ...], robot: str, height: float, seed: int = 0
     ) -> None:
         self.notices: list[str] = []
         self.now = 0.0

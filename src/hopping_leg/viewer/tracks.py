@@ -123,15 +123,13 @@ class Track:
         """Return the number of the last row up to each time, -1 if there is none."""
         return np.searchsorted(self.time, times + 1e-9, side="right") - 1
 
-    def apexes(self, until: float, seconds: float = 3.0) -> Array:
-        """Return the heights of the apexes in the ``seconds`` up to a time, m, (hops,)."""
-        first, last = np.searchsorted(self.time, [until - seconds, until + 1e-9])
-        part = [self.field(name)[first:last] for name in hop_detection.COLUMNS]
-        return hop_detection.find_hops(*part).apex if last - first > 1 else np.zeros(0)
-
     def last_apex(self, until: float) -> float:
-        """Return the height of the last apex up to a time, m, NaN if it is long ago."""
-        return float(np.append(np.nan, self.apexes(until))[-1])
+        """Return the height of the last apex up to a time, m, NaN if it is 3 s ago or more."""
+        first, last = np.searchsorted(self.time, [until - 3.0, until + 1e-9])
+        if last - first < 2:
+            return float("nan")
+        part = [self.field(name)[first:last] for name in hop_detection.COLUMNS]
+        return float(np.append(np.nan, hop_detection.find_hops(*part).apex)[-1])
 
 
 class ReplaySource:
