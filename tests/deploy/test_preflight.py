@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hopping_leg.deploy.drive_link import JointTransform, joint_transforms
+from hopping_leg.deploy.drive_link import JointTransform
 from hopping_leg.deploy.preflight import DriveInfo, check_drives, require_fit, required_settings
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import HardwareError
@@ -76,14 +76,6 @@ def test_there_and_back_is_the_identity_and_power_is_kept(transform, angle, torq
     assert transform.joint_torque(transform.motor_torque(torque)) == pytest.approx(torque, abs=1e-9)
     at_motor = transform.motor_torque(torque) * math.tau * transform.motor_velocity(angle)
     assert at_motor == pytest.approx(torque * angle, abs=1e-9)
-
-
-def test_the_knee_turns_half_as_fast_as_its_motor():
-    hip, knee = joint_transforms(load_robot("legv2"))
-    assert (hip.id, knee.id) == (1, 2)
-    assert hip.joint_velocity(1.0) == pytest.approx(math.tau)
-    assert knee.joint_velocity(1.0) == pytest.approx(math.pi)
-    assert knee.motor_torque(20.0) == pytest.approx(10.0)
 
 
 def test_limits_of_a_reversed_motor_stay_in_order():

@@ -12,14 +12,7 @@ from hopping_leg.controllers.protocol import Controller
 from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.robot import TIMESTEP, Robot, SoftLimits, kinematics
-from hopping_leg.sim import (
-    CONTROL_RATE,
-    LOADS,
-    LegSimulator,
-    NoiseAndDelay,
-    Plant,
-    Simulator,
-)
+from hopping_leg.sim import CONTROL_RATE, LOADS, LegSimulator, NoiseAndDelay, Plant, Simulator
 from hopping_leg.trace import COLUMNS, Trace
 
 _START_SHARE = 0.2 / 0.29  # leg length of the standing start as a share of the straight leg's

@@ -79,7 +79,14 @@ class PythonCan:
         """Send what the bus takes at once."""
         try:
             for frame in frames:
-                self._bus.send(message_of(frame), timeout=0.0)
+                message = can.Message(
+                    arbitration_id=frame.arbitration_id,
+                    is_extended_id=frame.extended,
+                    data=padded(frame.data),
+                    is_fd=True,
+                    bitrate_switch=True,
+                )
+                self._bus.send(message, timeout=0.0)
         except (can.CanError, OSError) as error:
             self.trouble = str(error)
 
@@ -114,14 +121,3 @@ def open_bus(interface: str, channel: str) -> can.BusABC:
         data_sample_point=66.0,
     )
     return can.Bus(interface=interface, channel=channel, timing=timing)
-
-
-def message_of(frame: Frame) -> can.Message:
-    """Return a frame as python-can knows it."""
-    return can.Message(
-        arbitration_id=frame.arbitration_id,
-        is_extended_id=frame.extended,
-        data=padded(frame.data),
-        is_fd=True,
-        bitrate_switch=True,
-    )
