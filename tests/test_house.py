@@ -9,9 +9,9 @@ ROOT = Path(__file__).parents[1]
 CEILINGS = {
     "src/hopping_leg/*.py": (12, 1190),
     "src/hopping_leg/cli/**/*.py": (16, 1935),
-    "src/hopping_leg/controllers/**/*.py": (20, 2817),
-    "src/hopping_leg/deploy/**/*.py": (20, 3390),
-    "src/hopping_leg/emulator/**/*.py": (15, 2065),
+    "src/hopping_leg/controllers/**/*.py": (20, 2770),
+    "src/hopping_leg/deploy/**/*.py": (20, 3370),
+    "src/hopping_leg/emulator/**/*.py": (15, 1995),
     "src/hopping_leg/envs/**/*.py": (10, 1513),
     "src/hopping_leg/evaluate/**/*.py": (13, 2120),
     "src/hopping_leg/formats/**/*.py": (1, 220),
