@@ -1,6 +1,5 @@
 import dataclasses
 import json
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -132,27 +131,9 @@ def test_the_papers_trials(robot):
 
 class FakePolicy:
     for_any_leg = False
-
-    def __init__(self, seed):
-        made = {"recipe": "fast", "robot": "other", "robot_digest": "0" * 16, "seed": seed}
-        self.card = SimpleNamespace(command_low=0.2, command_high=0.4, **made)
-        self.command_range = (0.2, 0.4)
-
+    command_range = (0.2, 0.4)
+    card = SimpleNamespace(recipe="fast", robot="other", robot_digest="0" * 16)
     stranger = Policy.stranger
-
-
-@pytest.fixture
-def load(robot, tmp_path, monkeypatch):
-    """Loads files of policies; the training seed is the file's name."""
-    for path in ("1.onnx", "2.onnx", "seed=1/1.onnx", "seed=2/1.onnx"):
-        (tmp_path / path).parent.mkdir(exist_ok=True)
-        (tmp_path / path).touch()
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(runner, "Policy", FakePolicy)
-    monkeypatch.setattr(
-        runner, "load_controller", lambda name, *_, **__: FakePolicy(int(Path(name).stem))
-    )
-    return lambda name: load_entries([name], robot, 200.0)
 
 
 @pytest.mark.parametrize(
@@ -164,8 +145,16 @@ def load(robot, tmp_path, monkeypatch):
         ("seed=1/1.onnx", ["seed=1/1.onnx"]),
     ],
 )
-def test_patterns_and_labels_become_entries_with_ranges_and_warnings(load, name, labels):
-    found = load(name)
+def test_patterns_and_labels_become_entries_with_ranges_and_warnings(
+    robot, tmp_path, monkeypatch, name, labels
+):
+    for path in ("1.onnx", "2.onnx", "seed=1/1.onnx", "seed=2/1.onnx"):
+        (tmp_path / path).parent.mkdir(exist_ok=True)
+        (tmp_path / path).touch()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(runner, "Policy", FakePolicy)
+    monkeypatch.setattr(runner, "load_controller", lambda *_, **__: FakePolicy())
+    found = load_entries([name], robot, 200.0)
     assert [c.label for c in found] == labels
     assert found[0].command_range == (0.2, 0.4)
     assert found[0].notes[0].startswith(f"{labels[0]} was trained on robot 'other'")

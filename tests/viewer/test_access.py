@@ -42,16 +42,24 @@ def test_this_computers_page_alone_is_served_and_only_to_itself(upgrade):
         assert answered.headers["X-Frame-Options"] == "DENY"
 
 
+def page_at(port):
+    return Viewer(LiveSimulation(("energy-shaping",), "legv2-paper", 0.3), port=port)
+
+
 @pytest.fixture
 def served():
     """Host and port of a live simulation's page."""
-    viewer = Viewer(LiveSimulation(("energy-shaping",), "legv2-paper", 0.3), port=0)
+    viewer = page_at(0)
     yield viewer.address.removeprefix("http://").split(":")
     viewer.close()
 
 
-def test_the_served_page_and_its_websocket_are_guarded(served):
+def test_the_served_page_and_its_websocket_are_guarded_and_a_taken_port_gives_another(served):
     host, port = served
+    assert host == "127.0.0.1"
+    other = page_at(int(port))
+    assert other.address not in (f"http://{host}:{port}", f"http://{host}:0")
+    other.close()
     for name, status in ((f"{host}:{port}", 200), ("elsewhere.example", 403)):
         connection = http.client.HTTPConnection(host, port, timeout=30)
         connection.request("GET", "/", headers={"Host": name})
