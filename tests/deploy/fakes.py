@@ -62,9 +62,6 @@ class FakeLink:
         self._command = outgoing
         self.mode = [MODES[outgoing.action]] * 2
 
-    def close(self):
-        pass
-
     def _reply(self, joint, taken):
         noise = 1e-5 * (-1) ** self.tick
         position, velocity = float(self.q[joint]) + noise, float(self.qd[joint])

@@ -12,19 +12,7 @@ from hypothesis import strategies as st
 from hopping_leg.deploy.keyboard import LiveHeight, handle_keys, keys
 
 HEIGHT_KEYS = (b"+", b"-", b"j", b"k", b"\x1b[A", b"\x1b[B", b"\x1bOA")
-OTHERS = (
-    b" ",
-    b"q",
-    b"Q",
-    b"\r",
-    b"\n",
-    b"\x1b",
-    b"x",
-    b"\x04",
-    b"\x1b[C",
-    "\u00e4".encode(),
-    b"\x00",
-)
+OTHERS = (*(bytes([key]) for key in b" qQ\r\n\x1bx\x04\x00"), b"\x1b[C", "\u00e4".encode())
 
 
 @given(

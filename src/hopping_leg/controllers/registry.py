@@ -15,11 +15,8 @@ from hopping_leg.sim import CONTROL_RATE
 ENERGY_SHAPING = "energy-shaping"
 """The tuned baseline."""
 
-ENERGY_SHAPING_FLYING = "energy-shaping-flying"
-"""The same, tuned to fly for half of the time at every command, as is asked of policies."""
-
-ENERGY_SHAPING_LITERAL = "energy-shaping-literal"
-"""The paper's law and gains as printed."""
+_FLYING = "energy-shaping-flying"  # tuned to fly half of the time, as is asked of policies
+_LITERAL = "energy-shaping-literal"  # the paper's law and gains as printed
 
 MPC_TRUE_STATE = "mpc-true-state"
 """Plans every push in the true state: in simulation alone."""
@@ -27,7 +24,7 @@ MPC_TRUE_STATE = "mpc-true-state"
 ROBOT_FILE = "robot.toml"
 """The robot of a training, in the folder of its policy."""
 
-_BUILT_IN = (ENERGY_SHAPING, ENERGY_SHAPING_FLYING, ENERGY_SHAPING_LITERAL, MPC_TRUE_STATE)
+_BUILT_IN = (ENERGY_SHAPING, _FLYING, _LITERAL, MPC_TRUE_STATE)
 _SHIPPED = resources.files("hopping_leg") / "policies"
 
 
@@ -126,7 +123,7 @@ def load_controller(
                 f" another controller, e.g. {ENERGY_SHAPING}."
             )
         return mpc.TrueStateMpc(robot, rate=rate)
-    if name == ENERGY_SHAPING_LITERAL:
+    if name == _LITERAL:
         return energy_shaping.paper_energy_shaping(robot, rate=rate)
     if name in _BUILT_IN or name.endswith(".toml"):
         return energy_shaping.tuned_energy_shaping(robot, rate=rate, gains=name)
