@@ -134,14 +134,6 @@ def mcap():
     return load_recording, {"run.mcap": to_mcap(Trace(TABLE)), "run.toml": SIDE}
 
 
-def sqlite():
-    from tests.test_formats import record
-
-    files = written(lambda folder: record(folder / "run", "sqlite3", TABLE))
-    files = dict(sorted(files.items(), key=lambda file: not file[0].endswith(".db3")))
-    return load_recording, {**files, "run/run.toml": SIDE}
-
-
 def header(table, content, read):
     """Return a Parquet file whose header is mutated."""
 
@@ -220,7 +212,6 @@ KINDS = {
     "recording-gzip": lambda: (load_recording, {"run.csv.gz": PACKED, "run.toml": SIDE}),
     "recording-sidecar": sidecar,
     "bag-mcap": mcap,
-    "bag-sqlite": sqlite,
     "trace-header": recording,
     "trace-excitation": excitation,
     "flight-recorder-raw": flight,

@@ -4,19 +4,16 @@ import json
 import re
 from pathlib import Path
 
-import numpy as np
 import polars as pl
 import pytest
 
 from hopping_leg.cli import FAILED, main
-from hopping_leg.identify.excitation import Excitation
-from hopping_leg.identify.play_excitation import play
 from hopping_leg.identify.result import save_robot
 from hopping_leg.robot import load_robot
 from tests.cli.emulated import put_behind
 from tests.identify.fitting import TRUTH, TWIN, identified, run
 from tests.identify.runs import SIDECAR, write_run
-from tests.identify.twin import swing
+from tests.identify.twin import hops
 
 FEW = ["--parameters", ",".join(TRUTH), "--search", "cma", "--population", "4"]
 
@@ -25,19 +22,10 @@ FEW = ["--parameters", ",".join(TRUTH), "--search", "cma", "--population", "4"]
 def recordings(tmp_path_factory):
     """Return two recordings of the twin, as `hop record` makes them."""
     folder = tmp_path_factory.mktemp("recordings")
-    files = []
-    for number in range(2):
-        files.append(folder / f"swing-{number}.parquet")
-        swung(TWIN, float(number)).save(files[-1])
+    files = [folder / "first.parquet", folder / "second.parquet"]
+    for seconds, file in zip((6.0, 5.0), files, strict=True):
+        hops(TWIN, seconds, "fixed-base").save(file)
     return files
-
-
-def swung(robot, phase):
-    """Return a recording of a robot that plays a swing of six seconds."""
-    position = swing(6.0, rate=100.0, phase=phase)
-    clock = np.arange(len(position)) / 100.0
-    excitation = Excitation(clock, position, 0 * position, "fixed-base", 100.0, "legv2", "a swing")
-    return play(excitation, robot, believed="legv2")
 
 
 def call(folder, *words):
@@ -72,7 +60,7 @@ def test_a_fit_that_is_worse_than_its_start_fails_and_every_file_says_so(
 ):
     """Fitted to the leg itself, judged by another leg, from that other leg's numbers."""
     judge = tmp_path / "judge.parquet"
-    swung(load_robot("legv2"), 2.0).save(judge)
+    hops(load_robot("legv2"), 6.0, "fixed-base").save(judge)
     words = [recordings[0], "--validate", judge, "--parameters", ",".join(TRUTH)]
     numbers, page = tmp_path / "leg.json", tmp_path / "leg.html"
     assert call(tmp_path, *words, "--json", numbers, "--report", page) == FAILED
