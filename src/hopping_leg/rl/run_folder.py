@@ -26,12 +26,7 @@ class RunFolder:
     """Paths and files of one run."""
 
     def __init__(
-        self,
-        path: Path,
-        recipe: Recipe,
-        robot: Robot,
-        seed: int,
-        minutes: float | None,
+        self, path: Path, recipe: Recipe, robot: Robot, seed: int, minutes: float | None
     ) -> None:
         self.path, self.checkpoints = path, path / "checkpoints"
         self.policy = path / "policy.onnx"
