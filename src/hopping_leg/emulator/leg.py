@@ -56,11 +56,6 @@ class EmulatedLeg:
         return float(self._legs.height[0])
 
     @property
-    def height_rate(self) -> float:
-        """Rate of the base's height, m/s."""
-        return float(self._legs.height_rate[0])
-
-    @property
     def foot_clearance(self) -> float:
         """Gap between foot and ground, m."""
         return float(self._legs.foot_clearance()[0])
