@@ -1,95 +1,240 @@
-"""Write ``legv2-identified``: leg V2 as the lab's recordings of it tell it.
+"""Write ``legv2-identified``: leg V2 as all of the lab's recordings of it tell it.
 
 ``python -m studies.identification.real_leg FOLDER FILE`` reads the folder of recordings and writes
-the robot file. With a clamped base, a number is that of a fit to all recordings, and its interval
-the hull of the 95 % intervals of that fit and of those that leave one recording out each: the
-drives' own loop is known only roughly, and the fits differ by more than each admits. Hopping on the
-boom the leg was commanded in torques. What both rigs tell is the mean of their two numbers, and its
-interval holds the boom's, too.
+the robot file, and beside it what was found (``--json``). Hops on both booms tell knee, belt,
+ground and the thigh's inertia; the clamped base tells the rest of the hip. An interval is that of
+the jackknife: of the fits that leave one recording out each. These fits judge, too: on every rig,
+what each predicts of the recording that it has not seen must be no worse than what the CAD does,
+joint by joint, else no file is written, the first line says what is worse and the exit code is 1.
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from hopping_leg.identify.pipeline import IdentifyOptions, identify
+import numpy as np
+
+from hopping_leg.identify.cost import Objective
+from hopping_leg.identify.optimizers import SearchOptions, least_squares
+from hopping_leg.identify.parameters import LegHypothesis, parameter_units
 from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.recording import Recording, load_recording
-from hopping_leg.identify.result import Identified
-from hopping_leg.io import Tree, replace_at, write_atomically
-from hopping_leg.robot import load_robot, robot_from_tree, robot_text
-from studies.identification.real import RIGS
+from hopping_leg.identify.simulate import cut
+from hopping_leg.identify.validation import validate
+from hopping_leg.io import Tree, replace_at, write_atomically, write_json
+from hopping_leg.robot import JOINTS, Robot, load_robot, robot_from_tree, robot_text
 
-BY_BOTH = ("thigh.inertia", "hip.friction", "knee.friction", "knee.armature")
-"""What a clamped leg and one on the boom tell of the robot."""
+SETS = {
+    "F": ("legv2_fixed_base", "*.csv.gz"),
+    "B130": ("legv2_boom", "*torque*"),
+    "B200": ("legv2_boom_200hz", "*/"),
+}
+"""Folders of recordings, and which of them hold torques."""
+BELT = [f"reality.knee.{n}" for n in ("stiffness", "stiffness_damping", "backlash", "efficiency")]
+KNEE = ["knee.friction", "knee.damping", "knee.armature", "thigh.inertia"]
+GROUND = ["contact.time_constant", "contact.damping_ratio", "contact.friction"]
+OF_BOOM = ["boom.weight", "boom.hip_friction", "drive.delay"]
+"""No part of the robot."""
+BY_BOOM = [*KNEE, *BELT, *GROUND]
+BY_BASE = ["thigh.com", "hip.friction", "hip.damping"]
+BOUNDS = {"drive.delay": (0.0, 0.006), "reality.knee.stiffness": (50.0, 600.0)}
+START = {
+    "reality.knee.stiffness": 300.0,
+    "reality.knee.stiffness_damping": 0.02,
+    "reality.knee.backlash": 0.005,
+}
+"""Where the search begins: the cost is rough along the stiffness."""
+_NINETY_FIVE = 1.96
+_WORSE = 1.1  # times the start's error, geometric mean over recordings and kinds of error
+_DIGITS = 4
 
-TOLD = ("thigh.com", "shank.com", "hip.damping", "knee.damping", *BY_BOTH)
-"""What a clamped leg tells; the rest stays as the CAD program has it."""
+Values = Mapping[str, float]
 
 _COMMENT = """\
 Leg V2 as the lab's recordings tell it; what they do not tell stays CAD.
 Made by `python -m studies.identification.real_leg FOLDER FILE`: least squares on
 {names}.
-[F] clamped base: the fit to all recordings, its interval the hull of the 95 % intervals of that fit
-and of those that leave one recording out; [B] the boom, where torques were commanded; [F, B] the
-mean of both and the hull of their intervals. Fitted with them, but no part of the robot: gains and
-delay of the drives' own loop, the torque-speed line, which the supply of that day bounds, and on
-the boom rail, ground, gear loss and the mass at the base.
+[B] hops on both booms, knee's torques converted to the joint, pushed by what was measured; [F] the
+clamped base, whose drives' own gains are fitted beside, with [B] given and the belt rigid. Each with
+the 95 % interval of the jackknife over recordings. Fitted with them, but no part of the robot: the
+boom's weight and what it rubs at the hip, delays, and gains of the drives' own loop.
 The hip's armature stays the CAD's; thigh and rotor move the hip alike, so thigh.inertia has what
-both miss. The lab's own files take L2 = 0.15 m, to the tip of the foot; here it is 0.14 m to its
-centre, as in legv2. A clamped leg's motion does not depend on it."""
+both miss."""
 
 
-def fit(recordings: Sequence[Recording], further: tuple[str, ...] = ()) -> Identified:
-    """Identify the leg from recordings, with what the plan fits besides the shank's inertia."""
-    robot = load_robot("legv2")
+@dataclass(frozen=True)
+class Fit:
+    """Found values of all parameters, robot's and others'."""
+
+    values: Values
+    cost: float
+    hypothesis: LegHypothesis
+
+
+def fit(recordings: Sequence[Recording], robot: Robot, names: Sequence[str]) -> Fit:
+    """Fit numbers of a robot and its drives to recordings."""
+    bounds = {
+        n: b for n, b in BOUNDS.items() if n in names and "boom" == recordings[0].metadata.rig
+    }
+    plan = make_plan(recordings, robot, parameters=tuple(names), bounds=bounds)
+    windows = cut(recordings, plan.window, unscored=plan.unscored)
+    objective = Objective(tuple(recordings), tuple(windows), plan.parameters, plan.scoring)
+    effort = (plan.parameters, objective.loss, SearchOptions())
+    found = least_squares(objective.residuals, *effort, groups=objective.jumping)
+    (hypothesis,) = plan.parameters.hypotheses(found.vector[None])
+    values = plan.parameters.values(found.vector).tolist()
+    return Fit(dict(zip(plan.parameters.names, values, strict=True)), found.cost, hypothesis)
+
+
+def with_values(robot: Robot, values: Values) -> Robot:
+    """Return the robot with those of the values that are a robot's."""
+    for name, value in values.items():
+        if not name.startswith(("drive.", "boom.")):
+            robot = replace_at(robot, name, value)
+    return robot
+
+
+def gains(recordings: Sequence[Recording], robot: Robot) -> list[str]:
+    """Return the names of the drives' own numbers on the clamped base."""
     names = make_plan(recordings, robot).parameters.names
-    told = tuple(name for name in (*names, *further) if name != "shank.inertia")
-    return identify(recordings, robot, options=IdentifyOptions(parameters=told))
+    return [name for name in names if name.startswith("drive.")]
 
 
-def ends(fits: Sequence[Identified], name: str) -> tuple[float, float, float]:
-    """Return a number as the first fit has it, and the hull of all fits' intervals."""
-    known = [one.identifiability for one in fits]
-    pairs = [(k.values[k.names.index(name)], k.half_width[k.names.index(name)]) for k in known]
-    low, high = min(v - h for v, h in pairs), max(v + h for v, h in pairs)
-    return float(pairs[0][0]), max(float(low), 0.0), float(high)
+def jackknife(values: Sequence[float]) -> float:
+    """Return the half width of the 95 % interval that leaving one recording out each tells."""
+    n = len(values)
+    return _NINETY_FIVE * float(
+        np.sqrt((n - 1) / n * np.sum((np.array(values) - np.mean(values)) ** 2))
+    )
 
 
-def robot_tree(clamped: Sequence[Identified], boom: Identified) -> Tree:
-    """Return the robot file's tables."""
+def judged(
+    recording: Recording, start: LegHypothesis, fitted: LegHypothesis
+) -> list[dict[str, Any]]:
+    """Return errors on a recording that the fit has not seen, before and after, by joint and kind."""
+    before, after = (validate([recording], h) for h in (start, fitted))
+    kinds = {
+        "position, rad": "closed_loop_position_rms_rad",
+        "torque, N m": "closed_loop_torque_rms_nm",
+    }
+    pairs = {kind: (getattr(before, name), getattr(after, name)) for kind, name in kinds.items()}
+    if recording.metadata.rig == "boom":
+        ahead = "open_loop_position_rms_rad"
+        pairs = {"position, rad": (getattr(before, ahead)["0.2"], getattr(after, ahead)["0.2"])}
+    return [
+        {"rig": recording.metadata.rig, "recording": recording.name, "joint": joint, "error": kind,
+         "before": old[at], "after": new[at]}
+        for kind, (old, new) in pairs.items()
+        for at, joint in enumerate(JOINTS)
+    ]  # fmt: skip
+
+
+def worse(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return a sentence for each rig and joint whose errors grew."""
+    found = []
+    for rig, joint in sorted({(row["rig"], row["joint"]) for row in rows}):
+        own = [row for row in rows if (row["rig"], row["joint"]) == (rig, joint)]
+        ratio = float(np.exp(np.mean([np.log(row["after"] / row["before"]) for row in own])))
+        if not ratio < _WORSE:
+            found.append(f"{rig}: the {joint} errs {ratio:.3g} times as much as by the CAD.")
+    return found
+
+
+def torque_scale(recordings: Sequence[Recording], robot: Robot, names: Sequence[str]) -> Values:
+    """Return by what the motors' measured torques at the joint must be multiplied, by joint."""
+    rest = [n for n in names if n != "reality.knee.efficiency"]
+    robot = replace_at(robot, "reality.knee.efficiency", 1.0)
+    found = fit(recordings, robot, [*rest, *(f"{joint}.torque_gain" for joint in JOINTS)])
+    return {joint: found.values[f"{joint}.torque_gain"] for joint in JOINTS}
+
+
+def main(folder: Path, file: Path, json: Path | None = None) -> int:
+    """Fit, judge, and write the robot file; return the exit code."""
+    sets = {
+        key: [load_recording(p) for p in sorted((folder / name).glob(pattern))]
+        for key, (name, pattern) in SETS.items()
+    }
+    sets["B130"] = [r for r in sets["B130"] if r.has_column("base_rise_m")]
+    clamped, hopping = sets["F"], [*sets["B130"], *sets["B200"]]
+    cad = load_robot("legv2")
+    start = with_values(cad, START)
+    of_boom, of_base = [*BY_BOOM, *OF_BOOM], [*BY_BASE, *gains(clamped, cad)]
+
+    def tell(what: str, found: Fit) -> Fit:
+        shown = ", ".join(f"{name} {value:.4g}" for name, value in found.values.items())
+        print(f"{what}: cost {found.cost:.5g}; {shown}", flush=True)
+        return found
+
+    first = tell("hops, hip as the CAD", fit(hopping, start, of_boom))
+    base = tell("clamped base", fit(clamped, with_values(start, first.values), of_base))
+    told = with_values(with_values(start, first.values), {n: base.values[n] for n in BY_BASE})
+    boom = tell("hops", fit(hopping, told, of_boom))
+    robot = with_values(told, boom.values)
+    believed = tell("clamped base by the CAD", fit(clamped, cad, gains(clamped, cad)))
+    without, rows = [], []
+    for left in hopping:
+        one = tell(
+            f"hops without {left.name}", fit([r for r in hopping if r is not left], told, of_boom)
+        )
+        kept = {n: v for n, v in one.values.items() if not n.startswith("drive.")}
+        without.append({"recording": left.name, "values": {n: base.values[n] for n in BY_BASE} | kept,
+                        "delay_s": one.values["drive.delay"]})  # fmt: skip
+        rows += judged(left, LegHypothesis(cad), one.hypothesis)
+    bases = []
+    for left in clamped:
+        others = [r for r in clamped if r is not left]
+        bases.append(tell(f"clamped base without {left.name}", fit(others, robot, of_base)))
+        rows += judged(left, fit(others, cad, gains(clamped, cad)).hypothesis, bases[-1].hypothesis)
+    scales = []
+    for key in ("B130", "B200"):
+        runs = sets[key]
+        each = [torque_scale([r for r in runs if r is not left], robot, of_boom) for left in runs]
+        whole = torque_scale(runs, robot, of_boom)
+        for joint, ratio in zip(JOINTS, (1.0, cad.knee.belt_ratio), strict=True):
+            half = jackknife([one[joint] for one in each])
+            scales.append({"rig": SETS[key][0], "joint": joint, "scale": ratio * whole[joint],
+                           "half_width": ratio * half, "recordings": len(runs)})  # fmt: skip
+            print(scales[-1], flush=True)
+    parameters = []
+    for names, rig, value, fits in (
+        (of_boom, "B", boom.values, [w["values"] | {"drive.delay": w["delay_s"]} for w in without]),
+        (of_base, "F", base.values, [one.values for one in bases]),
+    ):
+        for name in names:
+            half = jackknife([one[name] for one in fits])
+            parameters.append({"name": name, "rig": rig, "value": value[name], "half_width": half,
+                               "unit": parameter_units()[name]})  # fmt: skip
+    failed = worse(rows)
+    print(*failed, sep="\n")
+    if json is not None:
+        write_json(json, {"command": f"python -m studies.identification.real_leg FOLDER {file.name}",
+                          "parameters": parameters, "without": without, "judged": rows,
+                          "worse": failed, "torque_scales": scales,
+                          "clamped_gains_by_the_cad": dict(believed.values)})  # fmt: skip
+    if failed:
+        return 1
     tree: Tree = {
         "name": "legv2-identified",
         "description": "leg V2 as the lab's recordings tell it",
         "extends": "legv2",
     }
-    units = {p.name: p.unit for p in clamped[0].plan.parameters.parameters}
-    for name in TOLD:
-        (value, low, high), source = ends(clamped, name), "[F]"
-        if name in BY_BOTH:
-            other, least, most = ends([boom], name)
-            source = f"[F, B] {value:.3g} and {other:.3g};"
-            value, low, high = (value + other) / 2, min(low, least), max(high, most)
-        source = f"{source} 95 % interval {low:.3g} to {high:.3g}"
-        entry = {"value": float(f"{value:.4g}"), "unit": units[name], "source": source}
-        tree = replace_at(tree, name, entry)
-    return tree
-
-
-def main(folder: Path, file: Path) -> None:
-    """Fit, and write the robot file."""
-    loaded = {
-        rig: [load_recording(path) for path in sorted((folder / rig).glob("*.csv.gz"))]
-        for rig in (RIGS["leg V2, fixed base"], "legv2_boom")
-    }
-    clamped, hopping = loaded.values()
-    hopping = [r for r in hopping if r.has("torque_command")]
-    chosen = [clamped, *([r for r in clamped if r is not left] for left in clamped)]
-    tree = robot_tree([fit(some) for some in chosen], fit(hopping, ("base.mass",)))
-    names = ",\n".join(Path(r.name).name for r in (*clamped, *hopping))
+    for one in parameters:
+        if not one["name"].startswith(("drive.", "boom.")):
+            low, high = (max(one["value"] + s * one["half_width"], 0.0) for s in (-1, 1))
+            source = f"[{one['rig']}] 95 % interval {low:.3g} to {high:.3g}"
+            entry = {
+                "value": float(f"{one['value']:.{_DIGITS}g}"),
+                "unit": one["unit"],
+                "source": source,
+            }
+            tree = replace_at(tree, one["name"], entry)
     robot_from_tree(tree, str(file))
+    names = ",\n".join(Path(r.name).name for r in (*clamped, *hopping))
     write_atomically(file, robot_text(tree, _COMMENT.format(names=names)).encode())
+    return 0
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]))
+    raise SystemExit(main(*map(Path, sys.argv[1:])))

@@ -8,6 +8,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
 from hopping_leg.errors import RecordingError
+from hopping_leg.identify.hops import base_height
 from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.simulate import Window, WindowSimulator
@@ -175,7 +176,11 @@ def measured(simulator: WindowSimulator, quantity: str) -> Array:
         rows = slice(w.start + w.unscored, w.start + w.length)
         if of_joints:
             sampled = recording.array(quantity)[rows]
-        elif recording.metadata.rig != "fixed-base" and recording.has_column("height_m"):
+            sampled[(w.joints or w.length) - w.unscored :] = np.nan
+        elif recording.metadata.rig == "boom":
+            height = base_height(recording)
+            sampled = height[rows] - height[w.start]
+        elif recording.metadata.rig == "rail" and recording.has_column("height_m"):
             sampled = recording.trace.column("height_m")[rows].copy()
         else:
             continue

@@ -110,6 +110,13 @@ _RANGES = {
     "drive.sensor_gain": (0.5, 1.5),
     "load_friction": (0.0, 0.5),
     "backlash": (0.0, 0.02),
+    "efficiency": (0.5, 1.0),
+    "boom.mass": (-0.6, 0.6),
+    "boom.forward_mass": (-0.6, 1.0),
+    "boom.weight": (-5.0, 5.0),
+    "boom.hip_friction": (0.0, 1.0),
+    "boom.friction": (0.0, 3.0),
+    "boom.damping": (0.0, 10.0),
     "stiffness_damping": (0.0, 0.5),
 }
 """Widest bounds: by full name, else by the last part, prefixed by ``drive`` for drives."""

@@ -59,6 +59,9 @@ _RAIL_PARAMETERS = ["rail.friction", "rail.damping"]
 _INERTIAS = ["thigh.inertia", "shank.inertia"]
 _SOLVER_PARAMETERS = ["contact.time_constant", "contact.damping_ratio"]
 """Table I; inertias and the contact's are fixed in the first pass."""
+_BOOM_PARAMETERS = ["contact.friction", "boom.weight", "boom.hip_friction", "thigh.inertia"] + [
+    f"reality.knee.{name}" for name in ("efficiency", "stiffness", "stiffness_damping", "backlash")
+]
 _GAINS = {"stiffness": 10.0, "damping": 0.5, "integral": 1.0}
 """Where a search for an unknown gain begins, in the gain's unit at the joint."""
 _USUAL, _SOFTEST = 0.3, 0.02
@@ -131,9 +134,9 @@ def pass_names(rigs: Sequence[recording_format.Rig]) -> tuple[list[str], list[st
 
     Without a moving base among the rigs nothing is known of rail and contact.
     """
-    if set(rigs) == {"fixed-base"}:
-        return _JOINT_PARAMETERS, _INERTIAS
-    return _JOINT_PARAMETERS + _RAIL_PARAMETERS, _INERTIAS + _SOLVER_PARAMETERS
+    rail = _RAIL_PARAMETERS if "rail" in rigs else []
+    solver = [] if set(rigs) == {"fixed-base"} else _SOLVER_PARAMETERS
+    return _JOINT_PARAMETERS + rail, _INERTIAS + solver
 
 
 def _without_reality(robot: Robot, names: Sequence[str]) -> Robot:
@@ -148,6 +151,8 @@ def _names(recordings: Sequence[Recording], gains: list[str]) -> list[str]:
     first, second = pass_names([r.metadata.rig for r in recordings])
     names = [n for n in first + second if n not in (*_INERTIAS, "hip.armature")]
     names += ["thigh.com", "shank.com", *_INERTIAS, "drive.delay"]
+    if {r.metadata.rig for r in recordings} == {"boom"}:  # hops hardly tell where masses are
+        return [n for n in names if n.split(".")[-1] not in ("com", "inertia")] + _BOOM_PARAMETERS
     # What motors gave is known where it was commanded, or measured beside what was asked for.
     commanded = [r.metadata.onboard == "torque" for r in recordings]
     measured = [r.metadata.onboard == "zoh" and r.has("torque") for r in recordings]
@@ -231,6 +236,8 @@ def _start(recordings: Sequence[Recording], gains: list[str]) -> dict[str, float
 
 
 def _scoring(recordings: Sequence[Recording], gains: list[str]) -> cost.Scoring:
+    if any(r.metadata.rig == "boom" for r in recordings):
+        return cost.Scoring(position=0.015, height=0.003, torque=0.5, robust=3.0, unexplained=4.0)
     if all(r.metadata.onboard == "torque" for r in recordings):
         return cost.Scoring(position=0.02, robust=2.0, unexplained=0.4)
     torque = 0.2 if any(r.has("torque") for r in recordings) else None

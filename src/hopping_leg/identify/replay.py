@@ -128,6 +128,7 @@ def _replay_window(
     memory.waiting = 0
     memory.acceleration[:] = 0
     memory.motor_torque[:] = 0
+    memory.forward = 0
     memory.rotor[0], memory.rotor[1] = state[1], state[2]
     memory.rotor[2], memory.rotor[3] = state[4], state[5]
     scratch, none = np.empty(SCRATCH), np.empty((0, 6))

@@ -13,16 +13,16 @@ import numpy as np
 
 from hopping_leg.arrays import Array, Records
 from hopping_leg.errors import RecordingError, UsageError
-from hopping_leg.identify import initial_states, parameters, replay
+from hopping_leg.identify import hops, initial_states, parameters, replay
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.recording_format import float_column
-from hopping_leg.robot import COARSE_TIMESTEP, Robot, kinematics
+from hopping_leg.robot import COARSE_TIMESTEP, Robot, kinematics, load_robot
 from hopping_leg.sim.compiled import announce
 from hopping_leg.sim.leg_table import LEG, leg_table
 
 _GAINS = ("stiffness", "damping", "integral")
 _ONBOARD = {"torque": replay.TORQUE, "zoh": replay.ZOH, "continuous": replay.CONTINUOUS}
 _SURPLUS = 0.3  # share of an inertia beyond which damping is not made up for
+_UNLIMITED = 1e6  # N m
 _PARTS = 4  # pieces of work per thread, as windows differ in length
 
 
@@ -37,6 +37,8 @@ class Window:
     length: int
     unscored: int = 1
     """Rows at the beginning that no residual counts, while the start's error decays."""
+    joints: int | None = None
+    """Rows in which joints count; None for all."""
 
 
 def cut(
@@ -48,7 +50,7 @@ def cut(
 ) -> list[Window]:
     """Cut recordings into windows of one duration, s, whose first ``unscored`` s do not count.
 
-    Without a duration each recording is one window, as in the paper. The stride, s, is from one
+    A recording on a boom is cut as ``hops`` says, whatever the duration. Without a duration each recording is one window, as in the paper. The stride, s, is from one
     window's start to the next; without it there is no gap and no overlap.
     """
     windows: list[Window] = []
@@ -56,6 +58,13 @@ def cut(
         rate = recording.metadata.rate_hz
         skip = max(1, round(unscored * rate))
         before = len(windows)
+        if recording.metadata.rig == "boom":
+            robot = load_robot(recording.metadata.robot)
+            windows += [
+                Window(index, first, length, joints=joints)
+                for first, length, joints in hops.hop_windows(recording, robot)
+            ]
+            continue
         for segment in recording.segments():
             rows = segment.stop - segment.start
             length = rows if duration is None else round(duration * rate)
@@ -114,11 +123,9 @@ class _WindowGroup:
         self._spans["length"] = [w.length for w in windows]
         self._rows = np.concatenate([_recorded_rows(r) for r in self._recordings])
         self._moving = self._metadata.rig != "fixed-base"
-        heights = [float_column(r.trace.table, "height_m") for r in self._recordings]
-        self._height0 = np.concatenate(heights)[self._spans["start"]]
         zeroed = initial_states.has_encoder_offsets(self._metadata)
         self._offsets = [initial_states.OffsetFinder(r) for r in self._recordings if zeroed]
-        self._base_rates: dict[tuple[float, ...], Array] = {}
+        self._bases: dict[tuple[float, ...], tuple[Array, Array]] = {}
 
     def run(self, hypotheses: Sequence[parameters.LegHypothesis]) -> Array:
         """Return the results, (hypotheses, windows, rows, ``RESULT``)."""
@@ -146,6 +153,8 @@ class _WindowGroup:
         result[..., 4:6] *= _drive_values(hypotheses, "sensor_gain")[:, None, None]
         if not self._moving:
             result[..., 6] = np.nan
+        elif self._metadata.rig == "boom":  # where its ground is nobody measured
+            result[..., 6] -= result[:, :, :1, 6]
         return result
 
     def _table(self, hypotheses: Sequence[parameters.LegHypothesis]) -> Records:
@@ -171,6 +180,9 @@ class _WindowGroup:
         soft = np.where(legs["friction"] > 0, np.minimum(soft, legs["friction_stiffness"]), 1.0)
         legs["friction_stiffness"] = np.where(creep > 0, soft, legs["friction_stiffness"])
         legs["friction_damping"][creep[:, 0] > 0] = 1 / self._timestep
+        if self._metadata.rig == "boom":  # its torques were measured, and known no limit
+            for name in ("torque_limit", "saturation", "stall_torque"):
+                legs[name] = _UNLIMITED
         table = np.repeat(legs[:, None], len(self._recordings), axis=1)
         for n, recording in enumerate(self._recordings):
             if recording.metadata.torque_limit is not None:
@@ -206,21 +218,21 @@ class _WindowGroup:
         state[..., 1:3] = measured[:, :2] - offsets
         state[..., 4:6] = measured[:, 2:]
         if self._moving:
-            standing = [kinematics.stance_height(h.robot, measured[:, :2]) for h in hypotheses]
-            state[..., 0] = np.where(np.isnan(self._height0), np.stack(standing), self._height0)
-            state[..., 3] = [self._base_rate(h.robot) for h in hypotheses]
+            for one, h in zip(state, hypotheses, strict=True):
+                height, rate = self._base(h.robot)
+                standing = kinematics.stance_height(h.robot, measured[:, :2])
+                one[:, 0], one[:, 3] = np.where(np.isnan(height), standing, height), rate
         return state
 
-    def _base_rate(self, robot: Robot) -> Array:
-        """Return the base's first speed in each window, m/s; zero if no height was measured."""
+    def _base(self, robot: Robot) -> tuple[Array, Array]:
+        """Return the base's first height, m, NaN where it stands, and speed in windows, m/s."""
         lengths = (robot.thigh.length, robot.shank.length, robot.foot.radius)
-        if lengths not in self._base_rates:
-            rates = [
-                initial_states.base_rate(r, robot) if r.has_column("height_m") else np.zeros(len(r))
-                for r in self._recordings
-            ]
-            self._base_rates[lengths] = np.concatenate(rates)[self._spans["start"]]
-        return self._base_rates[lengths]
+        if lengths not in self._bases:
+            find = initial_states.base_state if self._metadata.rig == "rail" else hops.start_heights
+            heights, rates = zip(*(find(r, robot) for r in self._recordings), strict=True)
+            rows = self._spans["start"]
+            self._bases[lengths] = np.concatenate(heights)[rows], np.concatenate(rates)[rows]
+        return self._bases[lengths]
 
 
 def _recorded_rows(recording: Recording) -> Records:
@@ -229,6 +241,8 @@ def _recorded_rows(recording: Recording) -> Records:
     rows["state"] = np.concatenate(initial_states.start_states(recording), axis=1)
     for name in ("position", "velocity", "torque"):
         rows[name] = np.nan_to_num(recording.array(f"{name}_command"))
+    if metadata.rig == "boom" and recording.has("torque"):  # a row late, as it answers
+        rows["torque"][:-1] = np.nan_to_num(recording.array("torque"))[1:]
     rows["slope"][:-1] = rows["velocity"][:-1]
     for column, name in ((0, "stiffness"), (2, "damping")):  # rows win over the metadata
         found, stated = recording.array(name), getattr(metadata, name) or (np.nan, np.nan)

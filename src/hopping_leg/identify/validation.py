@@ -60,7 +60,8 @@ def open_loop(
     driven = [
         d
         for d in map(as_torque_driven, recordings)
-        if max(s.stop - s.start for s in d.segments()) >= max(3, horizon * d.metadata.rate_hz)
+        if (d.metadata.rig != "boom" or horizon == HORIZONS[0])  # whose hops have one length
+        and max(s.stop - s.start for s in d.segments()) >= max(3, horizon * d.metadata.rate_hz)
         and d.has("torque_command")
     ]
     windows = [w for w in cut(driven, horizon, stride=horizon / 2) if _starts_known(driven, w)]

@@ -64,6 +64,8 @@ class Boom:
     mass: float = quantity("kg", 0.0, signed=True)
     forward_mass: float = quantity("kg", 0.0, signed=True)
     weight: float = quantity("N", 0.0, signed=True)
+    hip_friction: float = quantity("N m", 0.0, zero=True)
+    """Coulomb friction that the mounting adds at the hip, e.g. by cables and a loaded axle."""
     friction: float = quantity("N", 0.0, zero=True)
     """Coulomb friction of its joints, at the tip."""
     damping: float = quantity("N s/m", 0.0, zero=True)
@@ -73,7 +75,7 @@ class Boom:
 
     def __add__(self, other: "Boom") -> "Boom":
         """Return this boom with what another one has beyond its masses."""
-        names = ("mass", "forward_mass", "weight", "friction", "damping")
+        names = ("mass", "forward_mass", "weight", "hip_friction", "friction", "damping")
         more = {name: getattr(self, name) + getattr(other, name) for name in names}
         return dataclasses.replace(self, **more)
 

@@ -91,6 +91,7 @@ def _row(robot: Robot, timestep: float, fixed_base: bool) -> Records:
     row["rail_damping"], row["rail_friction"] = guide.damping, guide.friction
     for name in ("damping", "friction", "load_friction", "armature", "stop_lower", "stop_upper"):
         row[name] = robot.of_joints(name)
+    row["friction"][0] += robot.boom.hip_friction * (robot.boom.radius > 0)
     row["stiction"] = row["friction"] * (reality.of_drives("stiction") - 1)
     row["stiction_speed"] = reality.of_drives("stiction_speed")
     row["belt_damping"] = reality.of_drives("stiffness_damping")
