@@ -173,7 +173,8 @@ def main(folder: Path, file: Path, json: Path | None = None) -> int:
     boom = tell("hops", fit(hopping, told, of_boom))
     robot = with_values(told, boom.values)
     believed = tell("clamped base by the CAD", fit(clamped, cad, gains(clamped, cad)))
-    without, rows = [], []
+    without: list[dict[str, Any]] = []
+    rows: list[dict[str, Any]] = []
     for left in hopping:
         one = tell(
             f"hops without {left.name}", fit([r for r in hopping if r is not left], told, of_boom)
@@ -182,12 +183,13 @@ def main(folder: Path, file: Path, json: Path | None = None) -> int:
         without.append({"recording": left.name, "values": {n: base.values[n] for n in BY_BASE} | kept,
                         "delay_s": one.values["drive.delay"]})  # fmt: skip
         rows += judged(left, LegHypothesis(cad), one.hypothesis)
-    bases = []
+    bases: list[Values] = []
     for left in clamped:
         others = [r for r in clamped if r is not left]
-        bases.append(tell(f"clamped base without {left.name}", fit(others, robot, of_base)))
-        rows += judged(left, fit(others, cad, gains(clamped, cad)).hypothesis, bases[-1].hypothesis)
-    scales = []
+        other = tell(f"clamped base without {left.name}", fit(others, robot, of_base))
+        bases.append(other.values)
+        rows += judged(left, fit(others, cad, gains(clamped, cad)).hypothesis, other.hypothesis)
+    scales: list[dict[str, Any]] = []
     for key in ("B130", "B200"):
         runs = sets[key]
         each = [torque_scale([r for r in runs if r is not left], robot, of_boom) for left in runs]
@@ -197,10 +199,10 @@ def main(folder: Path, file: Path, json: Path | None = None) -> int:
             scales.append({"rig": SETS[key][0], "joint": joint, "scale": ratio * whole[joint],
                            "half_width": ratio * half, "recordings": len(runs)})  # fmt: skip
             print(scales[-1], flush=True)
-    parameters = []
+    parameters: list[dict[str, Any]] = []
     for names, rig, value, fits in (
         (of_boom, "B", boom.values, [w["values"] | {"drive.delay": w["delay_s"]} for w in without]),
-        (of_base, "F", base.values, [one.values for one in bases]),
+        (of_base, "F", base.values, bases),
     ):
         for name in names:
             half = jackknife([one[name] for one in fits])
@@ -231,8 +233,8 @@ def main(folder: Path, file: Path, json: Path | None = None) -> int:
             }
             tree = replace_at(tree, one["name"], entry)
     robot_from_tree(tree, str(file))
-    names = ",\n".join(Path(r.name).name for r in (*clamped, *hopping))
-    write_atomically(file, robot_text(tree, _COMMENT.format(names=names)).encode())
+    made_of = ",\n".join(Path(r.name).name for r in (*clamped, *hopping))
+    write_atomically(file, robot_text(tree, _COMMENT.format(names=made_of)).encode())
     return 0
 
 

@@ -46,7 +46,7 @@ def base_course(recording: Recording) -> tuple[Array, Array]:
     time, height = recording.time, base_height(recording)
     half = max(2, round(_HALF * recording.metadata.rate_hz))
     if len(time) < 2 * half + 1:
-        return np.zeros((2, len(time)))
+        return np.zeros(len(time)), np.zeros(len(time))
     first = np.clip(np.arange(len(time)) - half, 0, len(time) - 2 * half - 1)
     rows = first[:, None] + np.arange(2 * half + 1)
     t = (time[rows] - time[:, None])[..., None] ** np.arange(3)

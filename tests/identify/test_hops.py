@@ -1,0 +1,114 @@
+"""Hops on a boom: found from the base's course alone, and good for a fit."""
+
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+import pytest
+
+from hopping_leg.errors import RecordingError
+from hopping_leg.identify import hops
+from hopping_leg.identify.pipeline import IdentifyOptions, identify
+from hopping_leg.identify.recording import load_recording, make_recording
+from hopping_leg.identify.recording_format import RecordingMetadata
+from hopping_leg.identify.simulate import cut
+from hopping_leg.robot import Boom, kinematics, load_robot
+from hopping_leg.sim import LegSimulator
+from tests.identify.runs import RECORDINGS, needs_recordings
+
+CAD = load_robot("legv2")
+BOOM = Boom(1.146, 0.3, 0.378, masses=((1.3, -0.7, 0.3), (0.9, 0.45, 0.0)))
+TRUE = replace(CAD, knee=replace(CAD.knee, friction=0.2), boom=replace(BOOM, weight=0.8))
+REST, AIR = np.array([1.5, -2.2]), np.array([0.9, -1.9])
+
+
+def hopping(robot=TRUE, count=4):
+    """Return a recording of hops that begin at rest, and the rows at which the foot takes off."""
+    legs = LegSimulator(robot, 1, timestep=2.5e-4)
+    legs.stand(slice(None), REST)
+    rows, lifted = [], []
+    for tick in range(200 * count):
+        phase = tick % 200
+        q, qd, touching = legs.q[0], legs.qd[0], legs.foot_clearance()[0] <= 0
+        length = np.hypot(*kinematics.foot_position(robot, q))
+        if phase == 40:
+            pushing = True
+        if phase < 40 or not pushing:
+            target = REST if phase < 40 or phase > 130 else AIR
+            torque = [30.0, 30.0] * (target - q) - [1.0, 1.0] * qd
+        else:
+            torque = kinematics.jacobian(robot, q).T @ [60.0 + 5 * (tick // 200), 0.0]
+            pushing = length < 0.2
+        rows.append([tick / 200, *q, *qd, *legs.measured_torque[0], *torque, legs.height[0]])
+        legs.step(np.array([torque]))
+        if touching and phase > 40 and legs.foot_clearance()[0] > 0:
+            lifted.append(tick + 1)
+    names = ("time_s", "hip_position_rad", "knee_position_rad", "hip_velocity_rad_s",
+             "knee_velocity_rad_s", "hip_torque_nm", "knee_torque_nm", "hip_command_nm",
+             "knee_command_nm", "height_m")  # fmt: skip
+    table = pl.DataFrame(np.array(rows), schema=dict.fromkeys(names, pl.Float64), orient="row")
+    metadata = RecordingMetadata("boom", 200.0, "legv2", "simulated", boom=BOOM)
+    return make_recording(table, metadata, "hops"), lifted
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    return hopping()
+
+
+def test_flights_begin_when_the_foot_takes_off(recorded):
+    recording, lifted = recorded
+    found = hops.flights(recording, CAD)
+    assert len(found) == 4
+    for flight in found:
+        assert min(abs(flight.start - row) for row in lifted) <= 6
+        assert flight.rest is not None
+        assert 0 < flight.start - flight.rest < 60
+
+
+def test_a_window_begins_at_rest_or_lies_in_a_flight(recorded):
+    recording, _ = recorded
+    height, rate = hops.start_heights(recording, CAD)
+    for window in cut([recording], 0.25):
+        speed = np.abs(recording.array("velocity")[window.start]).max()
+        if np.isnan(height[window.start]):
+            assert speed < 0.3
+            assert window.joints < window.length
+        else:
+            assert window.joints == window.length
+            true = recording.trace.column("height_m")[window.start]
+            assert height[window.start] == pytest.approx(true, abs=0.015)  # the ground gives
+            slope = np.gradient(recording.trace.column("height_m"), recording.time)
+            assert rate[window.start] == pytest.approx(slope[window.start], abs=0.05)
+
+
+def test_hops_tell_friction_and_weight(recorded):
+    recording, _ = recorded
+    other, _ = hopping(count=2)
+    options = IdentifyOptions(parameters=("knee.friction", "boom.weight"))
+    found = identify([recording], CAD, validate=[other], options=options)
+    friction, weight = found.identifiability.values
+    assert friction == pytest.approx(0.2, abs=0.03)
+    assert weight == pytest.approx(0.8, abs=0.15)
+
+
+def test_a_boom_is_described_and_only_a_boom():
+    with pytest.raises(RecordingError, match="describe a boom"):
+        RecordingMetadata("boom", 200.0, "legv2", "x")
+    with pytest.raises(RecordingError, match="only a boom"):
+        RecordingMetadata("rail", 200.0, "legv2", "x", boom=BOOM)
+
+
+@needs_recordings
+def test_the_labs_folder_is_read_as_it_is():
+    """Signs, torques behind the belt, and a height that closes the standing leg's kinematics."""
+    recording = load_recording(RECORDINGS / "legv2_boom_200hz" / "static")
+    assert recording.metadata.rate_hz == 200.0
+    found = hops.flights(recording, CAD)
+    assert len(found) >= 10
+    rests = [flight.rest for flight in found if flight.rest]
+    assert (recording.array("position")[rests, 1] < 0).all()
+    standing = kinematics.stance_height(CAD, recording.array("position")[rests])
+    height = recording.trace.column("height_m")[rests] - standing
+    assert np.median(np.abs(height)) < 2e-3
+    assert np.abs(recording.array("torque_command")[:, 1]).max() > 12.0
