@@ -136,6 +136,16 @@ def _lines(tree: Any, indent: str = "") -> str:  # noqa: ANN401
     return f"{left}\n" + ",\n".join(f"{inner}{part}" for part in parts) + f"\n{indent}{right}"
 
 
+def recordings_folder(named: Path | None) -> Path:
+    """Return the folder of real recordings, or raise UsageError if none is named."""
+    folder = named or os.environ.get("HOPPING_LEG_RECORDINGS")
+    if not folder:
+        raise UsageError(
+            "Name the folder of recordings with --recordings, or in HOPPING_LEG_RECORDINGS."
+        )
+    return Path(folder)
+
+
 def once(file: Path, asked: Row, work: Callable[..., Row], *arguments: object) -> Row:
     """Return what a file keeps of the same work, or do it and keep its result there.
 

@@ -15,4 +15,7 @@ RESULTS = (
     "studies/identification/results/paper_size.json",
     "python -m studies.identification --parts recordings --json "
     "studies/identification/results/recordings.json",
+    "python -m studies.identification.real_leg --out "
+    "src/hopping_leg/robot/robots/legv2-elastic.toml --json "
+    "studies/identification/results/real_leg.json",
 )

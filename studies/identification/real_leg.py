@@ -1,14 +1,13 @@
-"""Write ``legv2-identified``: leg V2 as all of the lab's recordings of it tell it.
+"""Write ``legv2-elastic``: leg V2 with its belt, as all of the lab's recordings of it tell it.
 
-``python -m studies.identification.real_leg FOLDER FILE`` reads the folder of recordings and writes
-the robot file, and beside it what was found (``--json``). Hops on both booms tell knee, belt,
+``python -m studies.identification.real_leg --out FILE`` reads the recordings and writes the robot
+file, and what else was found with ``--json``. Hops on both booms tell knee, belt,
 ground and the thigh's inertia; the clamped base tells the rest of the hip. An interval is that of
 the jackknife: of the fits that leave one recording out each. These fits judge, too: on every rig,
 what each predicts of the recording that it has not seen must be no worse than what the CAD does,
-joint by joint, else no file is written, the first line says what is worse and the exit code is 1.
+joint by joint, else no file is written and the one sentence of the error says what is worse.
 """
 
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from hopping_leg.errors import PhysicsError
 from hopping_leg.identify.cost import Objective
 from hopping_leg.identify.optimizers import SearchOptions, least_squares
 from hopping_leg.identify.parameters import LegHypothesis, parameter_units
@@ -23,8 +23,9 @@ from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.recording import Recording, load_recording
 from hopping_leg.identify.simulate import cut
 from hopping_leg.identify.validation import validate
-from hopping_leg.io import Tree, replace_at, write_atomically, write_json
+from hopping_leg.io import Tree, replace_at, write_atomically
 from hopping_leg.robot import JOINTS, Robot, load_robot, robot_from_tree, robot_text
+from studies.shared import main, recordings_folder
 
 SETS = {
     "F": ("legv2_fixed_base", "*.csv.gz"),
@@ -40,25 +41,23 @@ OF_BOOM = ["boom.weight", "boom.hip_friction", "drive.delay"]
 BY_BOOM = [*KNEE, *BELT, *GROUND]
 BY_BASE = ["thigh.com", "hip.friction", "hip.damping"]
 BOUNDS = {"drive.delay": (0.0, 0.006), "reality.knee.stiffness": (50.0, 600.0)}
-START = {
-    "reality.knee.stiffness": 300.0,
-    "reality.knee.stiffness_damping": 0.02,
-    "reality.knee.backlash": 0.005,
-}
-"""Where the search begins: the cost is rough along the stiffness."""
+BELTS = ((150.0, 0.25), (250.0, 0.02), (330.0, 0.1))
+"""Stiffness and damping, N m/rad and N m s/rad, at which searches begin: the cost has several
+minima along them, and the lowest counts."""
 _NINETY_FIVE = 1.96
 _WORSE = 1.1  # times the start's error, geometric mean over recordings and kinds of error
 _DIGITS = 4
 
+LATENCY = "reality.latency.command"
 Values = Mapping[str, float]
 
 _COMMENT = """\
-Leg V2 as the lab's recordings tell it; what they do not tell stays CAD.
-Made by `python -m studies.identification.real_leg FOLDER FILE`: least squares on
+Leg V2 with its belt as the lab's recordings tell it; what they do not tell stays CAD.
+Made by `python -m studies.identification.real_leg`: least squares on
 {names}.
-[B] hops on both booms, knee's torques converted to the joint, pushed by what was measured; [F] the
-clamped base, whose drives' own gains are fitted beside, with [B] given and the belt rigid. Each with
-the 95 % interval of the jackknife over recordings. Fitted with them, but no part of the robot: the
+[B] hops on both booms, the knee's torques converted to the joint, pushed by what was measured;
+[F] the clamped base, whose drives' own gains are fitted beside, with [B] given and the belt rigid.
+Each has the 95 % interval of the jackknife over recordings. Fitted with them, but no part of the robot: the
 boom's weight and what it rubs at the hip, delays, and gains of the drives' own loop.
 The hip's armature stays the CAD's; thigh and rotor move the hip alike, so thigh.inertia has what
 both miss."""
@@ -76,7 +75,7 @@ class Fit:
 def fit(recordings: Sequence[Recording], robot: Robot, names: Sequence[str]) -> Fit:
     """Fit numbers of a robot and its drives to recordings."""
     bounds = {
-        n: b for n, b in BOUNDS.items() if n in names and "boom" == recordings[0].metadata.rig
+        n: b for n, b in BOUNDS.items() if n in names and recordings[0].metadata.rig == "boom"
     }
     plan = make_plan(recordings, robot, parameters=tuple(names), bounds=bounds)
     windows = cut(recordings, plan.window, unscored=plan.unscored)
@@ -89,11 +88,18 @@ def fit(recordings: Sequence[Recording], robot: Robot, names: Sequence[str]) -> 
 
 
 def with_values(robot: Robot, values: Values) -> Robot:
-    """Return the robot with those of the values that are a robot's."""
+    """Return the robot with those of the values that are a robot's, a delay as its latency."""
     for name, value in values.items():
-        if not name.startswith(("drive.", "boom.")):
+        if name == "drive.delay":
+            robot = replace_at(robot, LATENCY, value)
+        elif not name.startswith(("drive.", "boom.")):
             robot = replace_at(robot, name, value)
     return robot
+
+
+def named(values: Values) -> dict[str, float]:
+    """Return values by their names in a robot file: the delay on the boom is its latency."""
+    return {name.replace("drive.delay", LATENCY): value for name, value in values.items()}
 
 
 def gains(recordings: Sequence[Recording], robot: Robot) -> list[str]:
@@ -105,15 +111,14 @@ def gains(recordings: Sequence[Recording], robot: Robot) -> list[str]:
 def jackknife(values: Sequence[float]) -> float:
     """Return the half width of the 95 % interval that leaving one recording out each tells."""
     n = len(values)
-    return _NINETY_FIVE * float(
-        np.sqrt((n - 1) / n * np.sum((np.array(values) - np.mean(values)) ** 2))
-    )
+    spread = np.sum((np.array(values) - np.mean(values)) ** 2)
+    return _NINETY_FIVE * float(np.sqrt((n - 1) / n * spread))
 
 
 def judged(
     recording: Recording, start: LegHypothesis, fitted: LegHypothesis
 ) -> list[dict[str, Any]]:
-    """Return errors on a recording that the fit has not seen, before and after, by joint and kind."""
+    """Return errors on a recording that no fit has seen, before and after, by joint and kind."""
     before, after = (validate([recording], h) for h in (start, fitted))
     kinds = {
         "position, rad": "closed_loop_position_rms_rad",
@@ -150,8 +155,8 @@ def torque_scale(recordings: Sequence[Recording], robot: Robot, names: Sequence[
     return {joint: found.values[f"{joint}.torque_gain"] for joint in JOINTS}
 
 
-def main(folder: Path, file: Path, json: Path | None = None) -> int:
-    """Fit, judge, and write the robot file; return the exit code."""
+def identify(folder: Path) -> dict[str, Any]:
+    """Fit and judge; return every number."""
     sets = {
         key: [load_recording(p) for p in sorted((folder / name).glob(pattern))]
         for key, (name, pattern) in SETS.items()
@@ -159,7 +164,6 @@ def main(folder: Path, file: Path, json: Path | None = None) -> int:
     sets["B130"] = [r for r in sets["B130"] if r.has_column("base_rise_m")]
     clamped, hopping = sets["F"], [*sets["B130"], *sets["B200"]]
     cad = load_robot("legv2")
-    start = with_values(cad, START)
     of_boom, of_base = [*BY_BOOM, *OF_BOOM], [*BY_BASE, *gains(clamped, cad)]
 
     def tell(what: str, found: Fit) -> Fit:
@@ -167,11 +171,17 @@ def main(folder: Path, file: Path, json: Path | None = None) -> int:
         print(f"{what}: cost {found.cost:.5g}; {shown}", flush=True)
         return found
 
-    first = tell("hops, hip as the CAD", fit(hopping, start, of_boom))
-    base = tell("clamped base", fit(clamped, with_values(start, first.values), of_base))
-    told = with_values(with_values(start, first.values), {n: base.values[n] for n in BY_BASE})
-    boom = tell("hops", fit(hopping, told, of_boom))
-    robot = with_values(told, boom.values)
+    def hops(start: Robot) -> Fit:
+        tried = []
+        for belt in BELTS:
+            begin = with_values(start, dict(zip(BELT, belt, strict=False)))
+            tried.append(tell(f"hops, belt from {belt}", fit(hopping, begin, of_boom)))
+        return min(tried, key=lambda one: one.cost)
+
+    first = with_values(cad, hops(cad).values)
+    base = tell("clamped base", fit(clamped, first, of_base))
+    boom = hops(with_values(first, {n: base.values[n] for n in BY_BASE}))
+    told = robot = boom.hypothesis.robot
     believed = tell("clamped base by the CAD", fit(clamped, cad, gains(clamped, cad)))
     without: list[dict[str, Any]] = []
     rows: list[dict[str, Any]] = []
@@ -179,9 +189,7 @@ def main(folder: Path, file: Path, json: Path | None = None) -> int:
         one = tell(
             f"hops without {left.name}", fit([r for r in hopping if r is not left], told, of_boom)
         )
-        kept = {n: v for n, v in one.values.items() if not n.startswith("drive.")}
-        without.append({"recording": left.name, "values": {n: base.values[n] for n in BY_BASE} | kept,
-                        "delay_s": one.values["drive.delay"]})  # fmt: skip
+        without.append({"recording": left.name, "values": named(one.values)})
         rows += judged(left, LegHypothesis(cad), one.hypothesis)
     bases: list[Values] = []
     for left in clamped:
@@ -201,42 +209,60 @@ def main(folder: Path, file: Path, json: Path | None = None) -> int:
             print(scales[-1], flush=True)
     parameters: list[dict[str, Any]] = []
     for names, rig, value, fits in (
-        (of_boom, "B", boom.values, [w["values"] | {"drive.delay": w["delay_s"]} for w in without]),
+        (named(boom.values), "B", named(boom.values), [one["values"] for one in without]),
         (of_base, "F", base.values, bases),
     ):
         for name in names:
             half = jackknife([one[name] for one in fits])
             parameters.append({"name": name, "rig": rig, "value": value[name], "half_width": half,
                                "unit": parameter_units()[name]})  # fmt: skip
-    failed = worse(rows)
-    print(*failed, sep="\n")
-    if json is not None:
-        write_json(json, {"command": f"python -m studies.identification.real_leg FOLDER {file.name}",
-                          "parameters": parameters, "without": without, "judged": rows,
-                          "worse": failed, "torque_scales": scales,
-                          "clamped_gains_by_the_cad": dict(believed.values)})  # fmt: skip
-    if failed:
-        return 1
+    return {
+        "parameters": parameters, "without": without, "judged": rows, "worse": worse(rows),
+        "torque_scales": scales, "clamped_gains_by_the_cad": dict(believed.values),
+        "recordings": [r.name for r in (*clamped, *hopping)],
+    }  # fmt: skip
+
+
+def robot_tree(found: Mapping[str, Any]) -> Tree:
+    """Return the robot file's tables."""
     tree: Tree = {
-        "name": "legv2-identified",
-        "description": "leg V2 as the lab's recordings tell it",
+        "name": "legv2-elastic",
+        "description": "leg V2 with its belt, as the lab's recordings tell it",
         "extends": "legv2",
     }
-    for one in parameters:
-        if not one["name"].startswith(("drive.", "boom.")):
-            low, high = (max(one["value"] + s * one["half_width"], 0.0) for s in (-1, 1))
+    for one in found["parameters"]:
+        name, value, half = (one[key] for key in ("name", "value", "half_width"))
+        if not name.startswith(("drive.", "boom.")):
+            low, high = max(value - half, 0.0), value + half
             source = f"[{one['rig']}] 95 % interval {low:.3g} to {high:.3g}"
-            entry = {
-                "value": float(f"{one['value']:.{_DIGITS}g}"),
-                "unit": one["unit"],
-                "source": source,
-            }
-            tree = replace_at(tree, one["name"], entry)
-    robot_from_tree(tree, str(file))
-    made_of = ",\n".join(Path(r.name).name for r in (*clamped, *hopping))
-    write_atomically(file, robot_text(tree, _COMMENT.format(names=made_of)).encode())
-    return 0
+            rounded = float(f"{value:.{_DIGITS}g}")
+            entry = {"value": rounded, "unit": one["unit"], "source": source}
+            tree = replace_at(tree, name, entry)
+    return tree
+
+
+@dataclass(frozen=True)
+class RealLeg:
+    """Identify leg V2 from the lab's recordings on three rigs, and judge it on all of them."""
+
+    out: Path = Path("legv2-elastic.toml")
+    """Robot file to write."""
+    recordings: Path | None = None
+    """Folder with real recordings; default: the environment's HOPPING_LEG_RECORDINGS."""
+    json: Path | None = None
+    """Write every number to this file."""
+
+    def measure(self) -> dict[str, Any]:
+        """Run it, write the robot file, and return every number."""
+        found = identify(recordings_folder(self.recordings))
+        if found["worse"]:
+            raise PhysicsError(f"{' '.join(found['worse'])} No robot file was written.")
+        tree = robot_tree(found)
+        robot_from_tree(tree, str(self.out))
+        comment = _COMMENT.format(names=",\n".join(found["recordings"]))
+        write_atomically(self.out, robot_text(tree, comment).encode())
+        return found
 
 
 if __name__ == "__main__":
-    raise SystemExit(main(*map(Path, sys.argv[1:])))
+    raise SystemExit(main("identification.real_leg", RealLeg))

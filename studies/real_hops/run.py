@@ -6,7 +6,6 @@ fits that leave one recording out each and of the errors of the other runs' hops
 """
 
 import json
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,24 +15,25 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hopping_leg.arrays import Array
-from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import statistics
 from hopping_leg.figures import COLOURS, WIDTH, encode, styled
 from hopping_leg.io import replace_at, write_atomically
 from hopping_leg.robot import Robot, load_robot
 from studies.real_hops.recorded import RIGS, Hop, load_hops
 from studies.real_hops.simulated import Simulated, fall_apex, simulate
-from studies.shared import ROOT, show_rows
+from studies.shared import ROOT, recordings_folder, show_rows
 
 LEFT_OUT = ROOT / "studies/identification/results/real_leg.json"
 """What ``python -m studies.identification.real_leg`` found without each recording."""
-IDENTIFIED = "legv2-identified"
-ROBOTS = {"legv2": "CAD", "legv2-paper": "Table I", IDENTIFIED: "identified", "legv1": "CAD"}
+IDENTIFIED = "legv2-elastic"
+ROBOTS = {
+    "legv2": "CAD", "legv2-paper": "Table I", "legv2-identified": "identified, rigid",
+    IDENTIFIED: "identified with belt", "legv1": "CAD",
+}  # fmt: skip
 """What each robot is; ``legv1`` is the rail's."""
 DRIVES = {"measured": "torques as measured", "law": "the logged law"}
 PAPER_MM = "40 to 60"
 """Mean error of the paper's policy on the real leg, mm."""
-_VARIABLE = "HOPPING_LEG_RECORDINGS"
 _SETTLED = 0.04  # s after lift-off from which on the base flies freely
 _LEAST_RUNS = 3
 
@@ -72,12 +72,13 @@ def torque_errors(hop: Hop, found: Simulated) -> Array:
     return np.asarray(np.sqrt(np.mean(missed**2, axis=0)))
 
 
-def left_out(file: Path = LEFT_OUT) -> Mapping[str, Mapping[str, float]]:
-    """Return the identified numbers, by path, of the fits without each recording."""
+def known(file: Path = LEFT_OUT) -> tuple[Mapping[str, float], Mapping[str, Mapping[str, float]]]:
+    """Return what the boom is beyond its masses, and all numbers of fits without each recording."""
     if not file.is_file():
-        return {}
-    rows = json.loads(file.read_text(encoding="utf-8"))["without"]
-    return {row["recording"]: row["values"] for row in rows}
+        return {}, {}
+    stored = json.loads(file.read_text(encoding="utf-8"))
+    boom = {p["name"]: p["value"] for p in stored["parameters"] if p["name"].startswith("boom.")}
+    return boom, {row["recording"]: row["values"] for row in stored["without"]}
 
 
 def _with(robot: Robot, values: Mapping[str, float]) -> Robot:
@@ -89,13 +90,13 @@ def _with(robot: Robot, values: Mapping[str, float]) -> Robot:
 def compare(folder: Path, report: Callable[[str], None]) -> tuple[dict[str, Any], list[Any]]:
     """Return every number, and of one hop per rig what a figure shows."""
     rows, counts, shown = [], {}, []
-    others = left_out()
+    boom, others = known()
     for rig, how in RIGS.items():
         hops = load_hops(folder, rig)
         counts[rig], drawn = len(hops), []
         names = [name for name in ROBOTS if name.startswith(how.robot)]
         for name in names:
-            robot = load_robot(name)
+            robot = _with(load_robot(name), boom if how.robot == "legv2" else {})
             legs = [_with(robot, others.get(h.run, {}) if name == IDENTIFIED else {}) for h in hops]
             for drive in DRIVES if how.robot == "legv2" else ("measured",):
                 report(f"{rig}: {name}, {DRIVES[drive]}")
@@ -201,10 +202,7 @@ class RealHops:
 
     def measure(self) -> dict[str, Any]:
         """Run it, print and return every number."""
-        folder = self.recordings or os.environ.get(_VARIABLE)
-        if not folder:
-            raise UsageError(f"Name the folder of recordings with --recordings, or in {_VARIABLE}.")
-        result, shown = compare(Path(folder), print)
+        result, shown = compare(recordings_folder(self.recordings), print)
         columns = ("apex_mean_m", "apex_rms_m", "speed_mean_m_s", "push_mean_s", "flight_mean_s")
         show_rows(result["rows"], "rig", "robot", "drive", *columns)
         if self.figure is not None:

@@ -6,6 +6,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.robot import COARSE_TIMESTEP, load_robot
 from studies.identification.known import FIXED, compare, identify_twin, summary
 from studies.identification.real import real
+from studies.identification.real_leg import jackknife, named, robot_tree, worse
 from studies.identification.run import Identify, bars
 from studies.identification.study import Study
 from studies.identification.twin import AIR, record, twin
@@ -72,3 +73,28 @@ def test_a_known_twin_is_found():
 def test_intervals_hold_the_truth_of_independent_arms(tmp_path):
     result = Identify(arms=12, seed=500, parts=("coverage",), out=tmp_path).measure()
     assert result["coverage"]["share_inside"] > 0.9
+
+
+def test_leaving_one_out_tells_an_interval():
+    assert jackknife([2.0, 2.0, 2.0]) == 0.0
+    assert jackknife([1.0, 3.0]) == pytest.approx(1.96)  # of two, half their distance
+
+
+def test_a_leg_is_worse_where_one_joint_on_one_rig_is():
+    row = {"rig": "boom", "joint": "hip", "error": "position, rad", "before": 1.0, "after": 0.5}
+    better = [row, {**row, "error": "torque, N m", "after": 1.5}]
+    assert not worse(better)
+    said = worse([*better, {**row, "rig": "fixed-base", "joint": "knee", "after": 1.2}])
+    assert said == ["fixed-base: the knee errs 1.2 times as much as by the CAD."]
+
+
+def test_the_robot_file_has_what_is_the_robots():
+    found = named({"knee.friction": 0.2, "drive.delay": 2e-3, "boom.weight": 1.0})
+    parameters = [
+        {"name": name, "rig": "B", "value": value, "half_width": 0.5 * value, "unit": "x"}
+        for name, value in found.items()
+    ]
+    tree = robot_tree({"parameters": parameters})
+    assert tree["knee"]["friction"]["source"] == "[B] 95 % interval 0.1 to 0.3"
+    assert tree["reality"]["latency"]["command"]["value"] == 2e-3
+    assert "boom" not in tree

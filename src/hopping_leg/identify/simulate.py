@@ -50,8 +50,9 @@ def cut(
 ) -> list[Window]:
     """Cut recordings into windows of one duration, s, whose first ``unscored`` s do not count.
 
-    A recording on a boom is cut as ``hops`` says, whatever the duration. Without a duration each recording is one window, as in the paper. The stride, s, is from one
-    window's start to the next; without it there is no gap and no overlap.
+    A recording on a boom is cut as ``hops`` says, whatever the duration. Without a duration each
+    recording is one window, as in the paper. The stride, s, is from one window's start to the next;
+    without it there is no gap and no overlap.
     """
     windows: list[Window] = []
     for index, recording in enumerate(recordings):
