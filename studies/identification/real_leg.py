@@ -41,7 +41,7 @@ OF_BOOM = ["boom.weight", "boom.hip_friction", "drive.delay"]
 BY_BOOM = [*KNEE, *BELT, *GROUND]
 BY_BASE = ["thigh.com", "hip.friction", "hip.damping"]
 BOUNDS = {"drive.delay": (0.0, 0.006), "reality.knee.stiffness": (50.0, 600.0)}
-BELTS = ((150.0, 0.25), (250.0, 0.02), (330.0, 0.1))
+BELTS = ((150.0, 0.25), (250.0, 0.05), (330.0, 0.1))
 """Stiffness and damping, N m/rad and N m s/rad, at which searches begin: the cost has several
 minima along them, and the lowest counts."""
 _NINETY_FIVE = 1.96

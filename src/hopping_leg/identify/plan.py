@@ -237,7 +237,7 @@ def _start(recordings: Sequence[Recording], gains: list[str]) -> dict[str, float
 
 def _scoring(recordings: Sequence[Recording], gains: list[str]) -> cost.Scoring:
     if any(r.metadata.rig == "boom" for r in recordings):
-        return cost.Scoring(position=0.015, height=0.003, torque=0.5, robust=3.0, unexplained=4.0)
+        return cost.Scoring(position=0.03, height=0.006, torque=0.5, robust=3.0, unexplained=4.0)
     if all(r.metadata.onboard == "torque" for r in recordings):
         return cost.Scoring(position=0.02, robust=2.0, unexplained=0.4)
     torque = 0.2 if any(r.has("torque") for r in recordings) else None
