@@ -1,3 +1,0 @@
-"""Do controllers hop in another physics engine as well?"""
-
-RESULTS = ("python -m studies.engines --json studies/engines/results/engines.json",)
