@@ -62,7 +62,8 @@ Made by `python -m studies.identification.real_leg`: least squares on
 [B] hops on both booms, the knee's torques converted to the joint, pushed by what was measured;
 [F] the clamped base, whose drives' own gains are fitted beside, with [B] given and the belt rigid.
 Each has the 95 % interval of the jackknife over recordings; of three frictions of the ground it is
-the best, to a step. Fitted with them, but no part of the robot: the boom's weight and what it rubs at the hip, delays, and gains of the drives' own loop.
+the best, to a step. Fitted with them, but no part of the robot: the boom's weight and what it rubs
+at the hip, delays, and gains of the drives' own loop.
 The hip's armature stays the CAD's; thigh and rotor move the hip alike, so thigh.inertia has what
 both miss."""
 
