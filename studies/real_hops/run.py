@@ -120,7 +120,7 @@ def _row(hops: Sequence[Hop], found: Sequence[Simulated]) -> dict[str, Any]:
     """Return means and rms of the errors with intervals over runs, hops that failed among them."""
     each = [errors(hop, one) for hop, one in zip(hops, found, strict=True)]
     torques = [torque_errors(hop, one) for hop, one in zip(hops, found, strict=True)]
-    row: dict[str, Any] = {"hops": len(hops)}
+    row: dict[str, Any] = {"hops": len(hops), "inside_90": None, "half_width_m": None}
     runs = [hop.run for hop in hops]
     for name, unit in (("push", "s"), ("flight", "s"), ("speed", "m_s"), ("apex", "m")):
         by_run = [
