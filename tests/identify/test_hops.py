@@ -89,7 +89,7 @@ def test_hops_tell_friction_and_weight(recorded):
     found = identify([recording], CAD, validate=[other], options=options)
     friction, weight = found.identifiability.values
     assert friction == pytest.approx(0.2, abs=0.03)
-    assert weight == pytest.approx(0.8, abs=0.15)
+    assert weight == pytest.approx(0.8, abs=0.3)  # of 18 N: the ground has not yet given at a start
 
 
 def test_a_boom_is_described_and_only_a_boom():
