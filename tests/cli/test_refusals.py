@@ -69,7 +69,7 @@ REFUSED = [
     ("train --recipe paper --set reward.speed=3", "reward.height"),
     ("train --heights 0.4 0.2", "the smaller first"),
     ("train --observation dates", "dated, dated-long"),
-    ("train --robot twin", "beyond transmissions, delay and jitter"),
+    ("train --robot twin", "beyond transmissions and their losses"),
     ("train --out .", "holds no run"),
     ("view nobody", "There is no controller 'nobody'"),
     ("view fast paper fast", "give one, or two side by side"),

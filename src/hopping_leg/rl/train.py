@@ -114,9 +114,9 @@ def train(
         raise errors.UsageError(f"--minutes is {minutes:g} but must be positive.")
     if robot.reality != robot.reality.in_training:
         raise errors.RobotError(
-            f"{robot.name} has effects in [reality] beyond transmissions, delay and jitter, which"
-            " training does not know; train on what is believed of it, the robot that its file"
-            " extends or one from `hop identify`, and judge the policy with `hop evaluate`."
+            f"{robot.name} has effects in [reality] beyond transmissions and their losses, delay"
+            " and jitter, which training does not know; train on what is believed of it, the robot"
+            " that its file extends or one from `hop identify`, and judge with `hop evaluate`."
         )
     began = time.monotonic()
     torch.set_num_threads(max(threads, 1))

@@ -111,8 +111,8 @@ class ModelMismatch:
 
     @property
     def in_training(self) -> "ModelMismatch":
-        """What of it training simulates: transmissions, delay and jitter of commands."""
-        kept = ("backlash", "stiffness", "stiffness_damping")
+        """What of it training simulates: transmissions with losses, delay, jitter of commands."""
+        kept = ("backlash", "stiffness", "stiffness_damping", "efficiency")
         drives = (self.hip, self.knee)
         hip, knee = (DriveMismatch(**{k: getattr(d, k) for k in kept}) for d in drives)
         return ModelMismatch(latency=replace(self.latency, measurement=0.0), hip=hip, knee=knee)
