@@ -11,6 +11,7 @@ from hopping_leg.identify import hops
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import load_recording, make_recording
 from hopping_leg.identify.recording_format import RecordingMetadata
+from hopping_leg.identify.result import save_robot
 from hopping_leg.identify.simulate import cut
 from hopping_leg.robot import Boom, kinematics, load_robot
 from hopping_leg.sim import LegSimulator
@@ -82,12 +83,16 @@ def test_a_window_begins_at_rest_or_lies_in_a_flight(recorded):
             assert rate[window.start] == pytest.approx(slope[window.start], abs=0.05)
 
 
-def test_hops_tell_friction_and_weight(recorded):
+def test_hops_tell_friction_and_weight(recorded, tmp_path):
     recording, _ = recorded
     other, _ = hopping(count=2)
     options = IdentifyOptions(parameters=("knee.friction", "boom.weight"))
     found = identify([recording], CAD, validate=[other], options=options)
     friction, weight = found.identifiability.values
+    save_robot(found, tmp_path / "leg.toml", "legv2")
+    saved = load_robot(tmp_path / "leg.toml")
+    assert saved.knee.friction == pytest.approx(friction)
+    assert saved.boom == Boom()
     assert friction == pytest.approx(0.2, abs=0.03)
     assert weight == pytest.approx(0.8, abs=0.3)  # of 18 N: the ground has not yet given at a start
 

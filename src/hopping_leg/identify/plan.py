@@ -59,7 +59,7 @@ _RAIL_PARAMETERS = ["rail.friction", "rail.damping"]
 _INERTIAS = ["thigh.inertia", "shank.inertia"]
 _SOLVER_PARAMETERS = ["contact.time_constant", "contact.damping_ratio"]
 """Table I; inertias and the contact's are fixed in the first pass."""
-_BOOM_PARAMETERS = ["contact.friction", "boom.weight", "boom.hip_friction", "thigh.inertia"] + [
+_BOOM_PARAMETERS = ["contact.friction", "boom.weight", "thigh.inertia"] + [
     f"reality.knee.{name}" for name in ("efficiency", "stiffness", "stiffness_damping", "backlash")
 ]
 _GAINS = {"stiffness": 10.0, "damping": 0.5, "integral": 1.0}

@@ -259,7 +259,7 @@ def save_robot(identified: Identified, path: Path, origin: str | Path) -> None:
     tree["description"] = f"{identified.start.robot.name}, identified from recordings"
     for row in parameters_json(identified):
         delays = row["name"] == _DELAY
-        if not row["name"].startswith("drive.") or (delays and row["value"] > 0):
+        if not row["name"].startswith(("drive.", "boom.")) or (delays and row["value"] > 0):
             entry = {"value": row["value"], "unit": row["unit"], "source": _source(row)}
             tree = replace_at(tree, _LATENCY if delays else row["name"], entry)
     robot_from_tree(tree, str(path))
