@@ -186,7 +186,7 @@ def identify(folder: Path) -> dict[str, Any]:
     first = hops(cad, GRIPS[1:2]).hypothesis.robot
     base = tell("clamped base", fit(clamped, first, of_base))
     boom = hops(with_values(first, {n: base.values[n] for n in BY_BASE}), GRIPS)
-    told = robot = boom.hypothesis.robot
+    told = boom.hypothesis.robot
     believed = tell("clamped base by the CAD", fit(clamped, cad, gains(clamped, cad)))
     without: list[dict[str, Any]] = []
     rows: list[dict[str, Any]] = []
@@ -199,14 +199,14 @@ def identify(folder: Path) -> dict[str, Any]:
     bases: list[Values] = []
     for left in clamped:
         others = [r for r in clamped if r is not left]
-        other = tell(f"clamped base without {left.name}", fit(others, robot, of_base))
+        other = tell(f"clamped base without {left.name}", fit(others, told, of_base))
         bases.append(other.values)
         rows += judged(left, fit(others, cad, gains(clamped, cad)).hypothesis, other.hypothesis)
     scales: list[dict[str, Any]] = []
     for key in ("B130", "B200"):
         runs = sets[key]
-        each = [torque_scale([r for r in runs if r is not left], robot, of_boom) for left in runs]
-        whole = torque_scale(runs, robot, of_boom)
+        each = [torque_scale([r for r in runs if r is not left], told, of_boom) for left in runs]
+        whole = torque_scale(runs, told, of_boom)
         for joint, ratio in zip(JOINTS, (1.0, cad.knee.belt_ratio), strict=True):
             half = jackknife([one[joint] for one in each])
             scales.append({"rig": SETS[key][0], "joint": joint, "scale": ratio * whole[joint],

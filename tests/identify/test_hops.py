@@ -10,7 +10,7 @@ from hopping_leg.errors import RecordingError
 from hopping_leg.identify import hops
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import load_recording, make_recording
-from hopping_leg.identify.recording_format import RecordingMetadata
+from hopping_leg.identify.recording_format import MEASURED, PAIRS, RecordingMetadata
 from hopping_leg.identify.result import save_robot
 from hopping_leg.identify.simulate import cut
 from hopping_leg.robot import Boom, kinematics, load_robot
@@ -27,29 +27,23 @@ def hopping(robot=TRUE, count=4):
     """Return a recording of hops that begin at rest, and the rows at which the foot takes off."""
     legs = LegSimulator(robot, 1, timestep=2.5e-4)
     legs.stand(slice(None), REST)
-    rows, lifted = [], []
+    rows, lifted, pushing, length = [], [], False, 0.0
     for tick in range(200 * count):
         phase = tick % 200
         q, qd, touching = legs.q[0], legs.qd[0], legs.foot_clearance()[0] <= 0
+        pushing = phase == 40 or (phase > 40 and pushing and length < 0.2)
         length = np.hypot(*kinematics.foot_position(robot, q))
-        if phase == 40:
-            pushing = True
-        if phase < 40 or not pushing:
-            target = REST if phase < 40 or phase > 130 else AIR
-            torque = [30.0, 30.0] * (target - q) - [1.0, 1.0] * qd
-        else:
+        target = REST if phase < 40 or phase > 130 else AIR
+        torque = [30.0, 30.0] * (target - q) - [1.0, 1.0] * qd
+        if pushing:
             torque = kinematics.jacobian(robot, q).T @ [60.0 + 5 * (tick // 200), 0.0]
-            pushing = length < 0.2
         rows.append([tick / 200, *q, *qd, *legs.measured_torque[0], *torque, legs.height[0]])
         legs.step(np.array([torque]))
         if touching and phase > 40 and legs.foot_clearance()[0] > 0:
             lifted.append(tick + 1)
-    names = ("time_s", "hip_position_rad", "knee_position_rad", "hip_velocity_rad_s",
-             "knee_velocity_rad_s", "hip_torque_nm", "knee_torque_nm", "hip_command_nm",
-             "knee_command_nm", "height_m")  # fmt: skip
-    table = pl.DataFrame(np.array(rows), schema=dict.fromkeys(names, pl.Float64), orient="row")
+    names = ["time_s", *MEASURED, *PAIRS["torque_command"], "height_m"]
     metadata = RecordingMetadata("boom", 200.0, "legv2", "simulated", boom=BOOM)
-    return make_recording(table, metadata, "hops"), lifted
+    return make_recording(pl.DataFrame(np.array(rows), names), metadata, "hops"), lifted
 
 
 @pytest.fixture(scope="module")
@@ -63,13 +57,13 @@ def test_flights_begin_when_the_foot_takes_off(recorded):
     assert len(found) == 4
     for flight in found:
         assert min(abs(flight.start - row) for row in lifted) <= 6
-        assert flight.rest is not None
         assert 0 < flight.start - flight.rest < 60
 
 
 def test_a_window_begins_at_rest_or_lies_in_a_flight(recorded):
     recording, _ = recorded
     height, rate = hops.start_heights(recording, CAD)
+    slope = np.gradient(recording.trace.column("height_m"), recording.time)
     for window in cut([recording], 0.25):
         speed = np.abs(recording.array("velocity")[window.start]).max()
         if np.isnan(height[window.start]):
@@ -79,7 +73,6 @@ def test_a_window_begins_at_rest_or_lies_in_a_flight(recorded):
             assert window.joints == window.length
             true = recording.trace.column("height_m")[window.start]
             assert height[window.start] == pytest.approx(true, abs=0.015)  # the ground gives
-            slope = np.gradient(recording.trace.column("height_m"), recording.time)
             assert rate[window.start] == pytest.approx(slope[window.start], abs=0.05)
 
 
@@ -95,6 +88,23 @@ def test_hops_tell_friction_and_weight(recorded, tmp_path):
     assert saved.boom == Boom()
     assert friction == pytest.approx(0.2, abs=0.03)
     assert weight == pytest.approx(0.8, abs=0.3)  # of 18 N: the ground has not yet given at a start
+
+
+def test_a_boom_without_a_height_or_hops_is_refused(recorded):
+    recording = recorded[0]
+    with pytest.raises(RecordingError, match="where its base was"):
+        identify([recording.with_table(recording.trace.table.drop("height_m"))], CAD)
+    with pytest.raises(RecordingError, match="No flight of the base"):
+        identify([recording.part(0, 40)], CAD, validate=[recording])
+
+
+def test_a_boom_is_kept_in_a_file_and_an_older_field_passed_over(recorded, tmp_path):
+    recorded[0].save(tmp_path / "hops.parquet")
+    assert load_recording(tmp_path / "hops.parquet").metadata == recorded[0].metadata
+    recorded[0].trace.table.write_csv(tmp_path / "run.csv")
+    sidecar = 'rig = "rail"\nrate_hz = 200.0\nrobot = "legv2"\nsource = "x"\n'
+    (tmp_path / "run.toml").write_text(f"{sidecar}effective_gravity = 9.81\n")
+    assert load_recording(tmp_path / "run.csv").metadata.rig == "rail"
 
 
 def test_a_boom_is_described_and_only_a_boom():
@@ -114,6 +124,5 @@ def test_the_labs_folder_is_read_as_it_is():
     rests = [flight.rest for flight in found if flight.rest]
     assert (recording.array("position")[rests, 1] < 0).all()
     standing = kinematics.stance_height(CAD, recording.array("position")[rests])
-    height = recording.trace.column("height_m")[rests] - standing
-    assert np.median(np.abs(height)) < 2e-3
+    assert np.median(np.abs(recording.trace.column("height_m")[rests] - standing)) < 2e-3
     assert np.abs(recording.array("torque_command")[:, 1]).max() > 12.0

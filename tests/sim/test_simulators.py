@@ -1,10 +1,12 @@
 """The mechanics that the stepper and MuJoCo, its reference, obey."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import GRAVITY, load_robot
+from hopping_leg.robot import GRAVITY, Boom, load_robot
 from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.mujoco_simulator import MujocoSimulator
 from tests.sim.legs import POSTURE, with_joints
@@ -65,6 +67,7 @@ def test_motor_line_gain_load_friction_and_pushes_are_the_steppers():
     assert limited > 10
 
 
-def test_mujoco_simulates_no_reality_and_refuses_it():
-    with pytest.raises(UsageError, match="reality"):
-        MujocoSimulator(load_robot("twin"), 1)
+def test_mujoco_simulates_no_reality_and_no_boom_and_refuses_them():
+    for robot in (load_robot("twin"), replace(load_robot("legv2"), boom=Boom(1.1))):
+        with pytest.raises(UsageError, match="LegSimulator"):
+            MujocoSimulator(robot, 1)

@@ -52,9 +52,9 @@ def add_transmission(spec, name, drive):
 def add_boom(spec, boom):
     """Let the base move forward, too, and add the boom's inertias."""
     rail = spec.joint("rail")
-    rail.armature, rail.damping = boom.mass, [boom.damping, 0, 0]
+    rail.armature, rail.frictionloss = boom.mass, boom.friction
+    rail.damping[0] = boom.damping
     spec.body("base").mass -= boom.slider
-    rail.frictionloss = boom.friction
     ahead = spec.body("base").add_joint(
         name="ahead", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1, 0, 0]
     )
@@ -169,13 +169,10 @@ def worst_difference(robots, ticks, timestep=5e-4, *, fixed_base=False, seed=0):
     return worst, seen
 
 
-def randomised(name, count, seed=0, **reality):
+def randomised(name, count, seed=0, boom=Boom(), **reality):  # noqa: B008
     ranges = IDENTIFIABLE_RANGES + tuple(r for r in WIDE_RANGES if "reality" not in r.path)
-    base = load_robot(name)
-    if "boom" in reality:
-        base = dataclasses.replace(base, **reality)
-    elif reality:
-        base = with_reality(base, **reality)
+    base = with_reality(load_robot(name), **reality) if reality else load_robot(name)
+    base = dataclasses.replace(base, boom=boom)
     robots = sample(base, ranges + FURTHER, count, np.random.default_rng(seed))
     return [with_strong_motors(with_joints(robot, torque_gain=1.0)) for robot in robots]
 
@@ -256,27 +253,21 @@ def test_the_acceleration_obeys_gauss_principle(seed, count, sliding, boom):
 def test_energy_stays_what_it_is_on_a_booms_arc():
     """Of a frictionless leg in the air: inertia grows away from the pivot's height, weight not."""
     boom = Boom(1.1, 0.3, 0.38, masses=((1.3, -0.7, 0.3), (0.5, 0.4, 0.0)))
-    robot = dataclasses.replace(
-        with_joints(load_robot("legv2"), friction=0.0, damping=0.0), boom=boom
-    )
-    legs = LegSimulator(robot, 1, timestep=2e-5)
-    legs.place(slice(None), 0.6, np.array([0.3, -1.0]))
-    legs.state[:, 3:] = [2.0, 3.0, -4.0]
+    smooth = with_joints(load_robot("legv2"), friction=0.0, damping=0.0)
+    legs = LegSimulator(dataclasses.replace(smooth, boom=boom), 1, timestep=2e-5)
+    legs.state[:] = [0.6, 0.3, -1.0, 2.0, 3.0, -4.0]
     legs.forget(slice(None))
     legs.records["forward"] = 0.5
-    energies = []
+    p, energies = legs.table[0], []
+    moments = np.array([p["thigh_moment"], p["shank_moment"]])
     for _ in range(40):
-        x, q1, q2, v, w1, w2 = legs.state[0]
-        p, lean, y = legs.table[0], (legs.state[0, 0] - 0.3) / 1.1, legs.records["forward"][0]
-        m = dynamics.mass_matrix(robot, legs.q)[0]
-        m[0, 0] = p["mass"] / (1 - lean**2)
-        speed = np.array([v, w1, w2])
-        swing = p["thigh_moment"] * np.cos(q1) * w1 + p["shank_moment"] * np.cos(q1 + q2) * (
-            w1 + w2
-        )
-        kinetic = speed @ m @ speed / 2 + p["forward_mass"] * y**2 / 2 + y * swing
-        sag = p["thigh_moment"] * np.cos(q1) + p["shank_moment"] * np.cos(q1 + q2)
-        energies.append(kinetic + p["weight"] * x - GRAVITY * sag)
+        height, speed, forward = legs.height[0], legs.state[0, 3:], legs.records["forward"][0]
+        angles, rates, lean = np.cumsum(legs.q[0]), np.cumsum(legs.qd[0]), (height - 0.3) / 1.1
+        mass = dynamics.mass_matrix(smooth, legs.q)[0]
+        mass[0, 0] = p["mass"] / (1 - lean**2)
+        kinetic = (speed @ mass @ speed + p["forward_mass"] * forward**2) / 2
+        kinetic += forward * moments @ (np.cos(angles) * rates)
+        energies.append(kinetic + p["weight"] * height - GRAVITY * moments @ np.cos(angles))
         legs.step(np.zeros((1, 2)))
     assert abs(lean) > 0.3
     assert np.ptp(energies) < 2e-4 * kinetic

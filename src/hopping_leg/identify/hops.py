@@ -57,18 +57,15 @@ def base_course(recording: Recording) -> tuple[Array, Array]:
 
 def flights(recording: Recording, robot: Robot) -> list[Flight]:
     """Return the flights of a leg, in which its base falls by more than half of its gravity."""
-    leg, boom = robot.mass, recording.metadata.boom
-    if boom.radius:
-        leg -= boom.slider
+    boom = recording.metadata.boom
+    leg = robot.mass - boom.slider
     gravity = (GRAVITY * (leg + boom.moment) + boom.weight) / (leg + boom.inertia + boom.mass)
     falls = np.flatnonzero(base_course(recording)[1] < -gravity / 2)
     apart = np.flatnonzero(np.diff(falls) > 1 + _GAP * recording.metadata.rate_hz) + 1
     time, resting = recording.time, np.abs(recording.array("velocity")).max(axis=1) < _REST
     found = []
-    for rows_in_air in np.split(falls, apart):
-        if not len(rows_in_air):
-            continue
-        start, stop = int(rows_in_air[0]), int(rows_in_air[-1]) + 1
+    for aloft in np.split(falls, apart) if len(falls) else ():
+        start, stop = int(aloft[0]), int(aloft[-1]) + 1
         if time[stop - 1] - time[start] < _SHORTEST:
             continue
         rows = np.flatnonzero(resting[:start] & (time[:start] > time[start] - _LONGEST_PUSH))

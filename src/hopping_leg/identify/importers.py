@@ -55,9 +55,7 @@ _DERIVED: dict[str, Callable[[pl.DataFrame, Boom], pl.Series]] = {
     "t_exact": lambda table, _: (table["t_exact"] > 0).alias("exact_time"),
     "knee_vel_cmd": _hip_velocity,
     "boom_pitch": lambda t, boom: (boom.radius * t["boom_pitch"].sin()).alias("base_rise_m"),
-    "pitch_pos": lambda t, boom: (boom.pivot + boom.radius * t["pitch_pos"].sin()).alias(
-        "height_m"
-    ),
+    "pitch_pos": lambda t, b: (b.pivot + b.radius * t["pitch_pos"].sin()).alias("height_m"),
 }
 
 

@@ -77,6 +77,8 @@ def identify(
     for recording in (*recordings, *validate):
         _check_conventions(recording, plan.start)
     windows = cut(fit, plan.window, unscored=plan.unscored)
+    if not windows:
+        raise RecordingError("No flight of the base was found; record hops that begin at rest.")
     objective = Objective(
         tuple(fit), tuple(windows), plan.parameters, plan.scoring, options.threads
     )

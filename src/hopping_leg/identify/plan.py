@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hopping_leg.errors import RecordingError, RobotError, UsageError, unknown_name
-from hopping_leg.identify import cost, initial_states, recording_format
+from hopping_leg.identify import cost, hops, initial_states, recording_format
 from hopping_leg.identify.parameters import STIFFNESS, LegHypothesis, ParameterSet, choose
 from hopping_leg.identify.recording import Recording
 from hopping_leg.robot import COARSE_TIMESTEP, JOINTS, NO_MISMATCH, Robot, load_robot
@@ -35,6 +35,10 @@ def check_recordings(recordings: Sequence[Recording], robot: Robot) -> None:
             raise RecordingError(
                 f"{recording.name} has no positions of the {JOINTS[int(np.argmax(lacking))]};"
                 " record both joints, as one moves the other."
+            )
+        if recording.metadata.rig == "boom" and np.isnan(hops.base_height(recording)).all():
+            raise RecordingError(
+                f"{recording.name} does not say where its base was; record height_m or base_rise_m."
             )
         wanted, what = "position_command", "targets of its on-board PD"
         if recording.metadata.onboard == "torque":

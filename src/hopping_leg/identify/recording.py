@@ -227,5 +227,6 @@ def _described(
 
 def _metadata(tree: object, origin: str) -> RecordingMetadata:
     if isinstance(tree, dict):
-        tree.pop("quantisation", None)  # of the sensors, in older recordings
+        for name in ("quantisation", "effective_gravity"):  # in older recordings
+            tree.pop(name, None)
     return read_dataclass(RecordingMetadata, tree, origin, error=RecordingError)

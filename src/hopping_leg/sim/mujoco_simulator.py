@@ -40,10 +40,10 @@ class MujocoSimulator(Simulator):
         edit: Callable[[mujoco.MjSpec], None] | None = None,
     ) -> None:
         super().__init__(robot, count, rate, timestep)
-        if not robot.reality.neutral:
+        if not robot.reality.neutral or robot.boom.radius:
             raise UsageError(
-                f"{robot.name} has a [reality], which MuJoCo does not simulate; take the stepper,"
-                " LegSimulator."
+                f"{robot.name} has a [reality] or a [boom], which MuJoCo does not simulate; take"
+                " the stepper, LegSimulator."
             )
         spec = get_spec(robot, timestep)
         if edit is not None:
