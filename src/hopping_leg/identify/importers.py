@@ -40,14 +40,13 @@ LAB_FILES = ("stateData", "encoderData")
 """Tables of the lab's folders, row by row beside each other."""
 
 
-def _hip_velocity(table: pl.DataFrame, boom: Boom) -> pl.Series:
+def _hip_velocity(table: pl.DataFrame, _: Boom) -> pl.Series:
     """Return the hip's velocity command that its drive got.
 
     The leg swung by theta and stretched by k: q = (theta - k/2, k), with equal links. In all
     segments the hip lags behind the swing as its damping makes it without the swing's velocity
     (60 ms), but not behind the stretching, so the drive got -k/2 alone, not what the file says.
     """
-    del boom
     return (-0.5 * table["knee_vel_cmd"]).alias(PAIRS["velocity_command"][0])
 
 

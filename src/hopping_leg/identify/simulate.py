@@ -61,10 +61,8 @@ def cut(
         before = len(windows)
         if recording.metadata.rig == "boom":
             robot = load_robot(recording.metadata.robot)
-            windows += [
-                Window(index, first, length, joints=joints)
-                for first, length, joints in hops.hop_windows(recording, robot)
-            ]
+            for first, length, joints in hops.hop_windows(recording, robot):
+                windows.append(Window(index, first, length, joints=joints))
             continue
         for segment in recording.segments():
             rows = segment.stop - segment.start
