@@ -21,6 +21,7 @@ export function changedRow(robot, { payload, ground, delay }) {
   const mass = before + payload * robot.reality.mass.base;
   const light = (1 / mass - 1 / before) / 3;
   of("mass")[0] = mass;
+  of("weight")[0] += of("gravity")[0] * (mass - before);
   of("base_softness")[0] += light;
   of("shank_softness")[0] += light;
   of("rail_friction_stiffness")[0] *= mass / before;
