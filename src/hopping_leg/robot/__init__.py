@@ -1,79 +1,38 @@
 """What the leg is: parameters, geometry, kinematics and dynamics."""
 
-from hopping_leg.robot.hardware import REGISTER_MAP, Hardware
-from hopping_leg.robot.limits import (
-    OVERSPEED,
-    MotorLimit,
-    SoftLimits,
-    braking_times,
-    command_limits,
-)
-from hopping_leg.robot.model import (
-    COARSE_TIMESTEP,
-    CONTROL_RATE,
-    GRAVITY,
-    TIMESTEP,
-    build_model,
-    compile_spec,
-    get_spec,
-    to_urdf,
-)
-from hopping_leg.robot.model_mismatch import (
-    NO_MISMATCH,
-    STANDING_NOISE,
-    DriveMismatch,
-    GroundMismatch,
-    Latency,
-)
-from hopping_leg.robot.parameters import JOINTS, Boom, Joint, Link, Robot
-from hopping_leg.robot.robot_checks import check_physics, numbers
-from hopping_leg.robot.robot_files import (
-    DEFAULT_ROBOT,
-    doubts,
-    load_robot,
-    load_tree,
-    parent_robot,
-    robot_from_tree,
-    robot_text,
-    robot_tree,
-    shipped_robots,
-)
-
-__all__ = [
-    "COARSE_TIMESTEP",
-    "CONTROL_RATE",
-    "DEFAULT_ROBOT",
-    "GRAVITY",
-    "JOINTS",
-    "NO_MISMATCH",
-    "OVERSPEED",
-    "REGISTER_MAP",
-    "STANDING_NOISE",
-    "TIMESTEP",
-    "Boom",
-    "DriveMismatch",
-    "GroundMismatch",
-    "Hardware",
-    "Joint",
-    "Latency",
-    "Link",
-    "MotorLimit",
-    "Robot",
-    "SoftLimits",
-    "braking_times",
-    "build_model",
-    "check_physics",
-    "command_limits",
-    "compile_spec",
-    "doubts",
-    "get_spec",
-    "load_robot",
-    "load_tree",
-    "numbers",
-    "parent_robot",
-    "robot_from_tree",
-    "robot_text",
-    "robot_tree",
-    "shipped_robots",
-    "to_urdf",
-]
+from hopping_leg.robot.hardware import REGISTER_MAP as REGISTER_MAP
+from hopping_leg.robot.hardware import Hardware as Hardware
+from hopping_leg.robot.limits import OVERSPEED as OVERSPEED
+from hopping_leg.robot.limits import MotorLimit as MotorLimit
+from hopping_leg.robot.limits import SoftLimits as SoftLimits
+from hopping_leg.robot.limits import braking_times as braking_times
+from hopping_leg.robot.limits import command_limits as command_limits
+from hopping_leg.robot.model import COARSE_TIMESTEP as COARSE_TIMESTEP
+from hopping_leg.robot.model import CONTROL_RATE as CONTROL_RATE
+from hopping_leg.robot.model import GRAVITY as GRAVITY
+from hopping_leg.robot.model import TIMESTEP as TIMESTEP
+from hopping_leg.robot.model import build_model as build_model
+from hopping_leg.robot.model import compile_spec as compile_spec
+from hopping_leg.robot.model import get_spec as get_spec
+from hopping_leg.robot.model import to_urdf as to_urdf
+from hopping_leg.robot.model_mismatch import NO_MISMATCH as NO_MISMATCH
+from hopping_leg.robot.model_mismatch import STANDING_NOISE as STANDING_NOISE
+from hopping_leg.robot.model_mismatch import DriveMismatch as DriveMismatch
+from hopping_leg.robot.model_mismatch import GroundMismatch as GroundMismatch
+from hopping_leg.robot.model_mismatch import Latency as Latency
+from hopping_leg.robot.parameters import JOINTS as JOINTS
+from hopping_leg.robot.parameters import Boom as Boom
+from hopping_leg.robot.parameters import Joint as Joint
+from hopping_leg.robot.parameters import Link as Link
+from hopping_leg.robot.parameters import Robot as Robot
+from hopping_leg.robot.robot_checks import check_physics as check_physics
+from hopping_leg.robot.robot_checks import numbers as numbers
+from hopping_leg.robot.robot_files import DEFAULT_ROBOT as DEFAULT_ROBOT
+from hopping_leg.robot.robot_files import doubts as doubts
+from hopping_leg.robot.robot_files import load_robot as load_robot
+from hopping_leg.robot.robot_files import load_tree as load_tree
+from hopping_leg.robot.robot_files import parent_robot as parent_robot
+from hopping_leg.robot.robot_files import robot_from_tree as robot_from_tree
+from hopping_leg.robot.robot_files import robot_text as robot_text
+from hopping_leg.robot.robot_files import robot_tree as robot_tree
+from hopping_leg.robot.robot_files import shipped_robots as shipped_robots
