@@ -26,8 +26,7 @@ Kind = TypeVar("Kind")
 def write_atomically(path: Path, content: bytes) -> None:
     """Write a file so that a killed process or a full disk leaves the old one whole.
 
-    Raises:
-        TraceError: The file cannot be written.
+    TraceError says that the file cannot be written.
     """
     path = path.resolve()
     part = path.with_name(path.name + ".part")

@@ -49,9 +49,7 @@ class ProcessWorkers:
     def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> list[R]:
         """Call a function once per tuple of arguments; return what it returns, in their order.
 
-        Raises:
-            HoppingLegError: A task raised it.
-            UsageError: A worker died.
+        A task's HoppingLegError is raised here, UsageError where a worker died.
         """
         if self.count == 1:
             return [function(*values) for values in arguments]

@@ -128,10 +128,8 @@ def read_options(
 ) -> Any:  # noqa: ANN401
     """Return an instance of a dataclass of options, or of one of a union's, as subcommands.
 
-    Lists may be given with commas or spaces.
-
-    Raises:
-        SystemExit: Help was asked for, or the words are not as the options ask; either is printed.
+    Lists may be given with commas or spaces. SystemExit ends the program after it has printed the
+    help that was asked for, or what is wrong with the words.
     """
     apart = [part for word in words for part in _parts(word)]
     return tyro.cli(options, prog=program, description=description, args=apart, config=_CONFIG)

@@ -30,11 +30,7 @@ class CommandSchedule:
 
     @staticmethod
     def parse(text: str) -> "CommandSchedule":
-        """Read a schedule such as ``0.25:5,0.30:5``: height in m and duration in s of each step.
-
-        Raises:
-            UsageError: It is no schedule.
-        """
+        """Read steps of height, m, and duration, s, e.g. ``0.25:5,0.30:5``, or raise UsageError."""
         steps = []
         for part in text.split(","):
             try:
@@ -78,11 +74,7 @@ def command_range(controller: protocol.Controller, robot: Robot) -> Range:
 
 
 def check_schedule(schedule: CommandSchedule, valid: Range, name: str) -> None:
-    """Refuse heights out of a controller's range.
-
-    Raises:
-        UsageError: Naming the height and the range.
-    """
+    """Refuse heights out of a controller's range by a UsageError that names height and range."""
     slack = 1e-9
     for height, _ in schedule.steps:
         if not valid[0] - slack <= height <= valid[1] + slack:

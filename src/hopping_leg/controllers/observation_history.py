@@ -241,11 +241,7 @@ class AnyLeg(Dated):
         self._time = np.array([[[robot_numbers.fall_time(robot)]] for robot in robots])
 
     def inputs(self) -> Inputs:
-        """Return samples, torques and command in the leg's units, and the leg's numbers.
-
-        Raises:
-            UsageError: It does not know which leg it is on.
-        """
+        """Return all in the leg's units; UsageError where it does not know which leg it is on."""
         if self._numbers is None:
             raise UsageError(
                 "A policy for any leg does not know which it is on; tell it with `set_robot`."
@@ -292,11 +288,7 @@ OBSERVATION_HISTORIES: dict[str, type[ObservationHistory]] = {
 
 
 def make_observation_history(name: str, period: float) -> ObservationHistory:
-    """Return a fresh observation history for a control period, s.
-
-    Raises:
-        PolicyError: No layout has that name.
-    """
+    """Return a fresh history for a control period, s; PolicyError where no layout has that name."""
     if name not in OBSERVATION_HISTORIES:
         raise PolicyError(unknown_name("observation layout", name, OBSERVATION_HISTORIES))
     return OBSERVATION_HISTORIES[name](period)

@@ -53,8 +53,7 @@ def open_session(content: bytes, origin: str) -> Any:  # noqa: ANN401
 def measure_session(session: Any, shapes: dict[str, tuple[int, ...]], origin: str) -> float:  # noqa: ANN401
     """Return how long a graph takes for one leg, s, the fastest of some runs.
 
-    Raises:
-        PolicyError: It fails, gives something else than torques, or does not return.
+    PolicyError says that it fails, gives something else than torques, or does not return.
     """
     feeds = {name: np.zeros((1, *shape), np.float32) for name, shape in shapes.items()}
     options, took = onnxruntime.RunOptions(), []
@@ -149,11 +148,7 @@ class Card:
 
     @staticmethod
     def from_json(text: str, origin: str) -> "Card":
-        """Read a stored card.
-
-        Raises:
-            PolicyError: It is of another schema, incomplete or damaged.
-        """
+        """Read a stored card; PolicyError where it is of another schema, incomplete or damaged."""
         origin = f"The card of {origin}"
         values = parse_json(text, origin, PolicyError)
         if (schema := values.pop("schema", None)) != SCHEMA:
@@ -199,11 +194,7 @@ class Policy:
 
     @staticmethod
     def load(path: Path) -> "Policy":
-        """Read a policy file.
-
-        Raises:
-            PolicyError: It is missing, truncated, foreign or of another schema.
-        """
+        """Read a file; PolicyError where it is missing, truncated, foreign or of another schema."""
         try:
             content = path.read_bytes()
         except OSError as error:
@@ -265,11 +256,7 @@ class Policy:
         self._memory = np.zeros((count, self._memory_size), np.float32)
 
     def act(self, measurement: Measurement) -> Array:
-        """Return joint torques, N m, (n, 2).
-
-        Raises:
-            UsageError: A command lies outside the range that the policy was trained for.
-        """
+        """Return joint torques, N m, (n, 2); UsageError for a command out of the trained range."""
         newest, (low, high) = measurement.command[:, 0], self.command_range
         fits = (low - _ROUNDING <= newest) & (newest <= high + _ROUNDING)
         if not fits.all():

@@ -67,11 +67,7 @@ class UserController:
             self.controller.reset(count)
 
     def act(self, measurement: Measurement) -> Array:
-        """Return joint torques, N m, (n, 2).
-
-        Raises:
-            ControllerError: The controller failed or answered something else than torques.
-        """
+        """Return joint torques, N m, (n, 2); ControllerError for a failure or another answer."""
         with guarded(self.origin):
             torque = np.array(self.controller.act(measurement), np.float64)
         if torque.shape != (self._count, 2) or not np.isfinite(torque).all():
@@ -121,11 +117,7 @@ def load_user_controller(name: str, robot: Robot, rate: float) -> UserController
 
 
 def load_user_object(name: str) -> Any:  # noqa: ANN401
-    """Return what is called ``path/to/file.py:NAME`` or ``package.module:NAME``.
-
-    Raises:
-        ControllerError: There is no such file, module or name, or importing it fails.
-    """
+    """Return what ``path/to/file.py:NAME`` or ``module:NAME`` is, or raise ControllerError."""
     return _find(name)[1]
 
 
@@ -157,11 +149,7 @@ def _load_file(path: str) -> ModuleType:
 
 @contextlib.contextmanager
 def guarded(origin: str, failure: str = "failed") -> Iterator[None]:
-    """Let code of someone else run; what it raises becomes one sentence.
-
-    Raises:
-        ControllerError: Naming the controller, the error and its line.
-    """
+    """Let someone else's code run; a ControllerError names it, what it raises, and the line."""
     try:
         yield
     except HoppingLegError:

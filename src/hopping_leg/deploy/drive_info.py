@@ -39,8 +39,7 @@ def inspect(link: MoteusLink) -> tuple[DriveInfo, DriveInfo]:
 def configure(link: MoteusLink, joint: int, settings: Sequence[Setting]) -> None:
     """Write settings into a stopped drive (0 hip, 1 knee), and into its permanent memory.
 
-    Raises:
-        HardwareError: The drive does not take one.
+    HardwareError says that the drive does not take one.
     """
     console = Console(link, joint)
     for command in (*(f"conf set {s.name} {s.text}" for s in settings), "conf write"):
@@ -56,9 +55,7 @@ def home(link: MoteusLink, angles: Sequence[float]) -> None:
     """Tell both stopped drives where their joints are; the rotor's own position makes it exact.
 
     Angles, rad, are of hip and knee, within a twelfth of a turn of the motors' outputs.
-
-    Raises:
-        HardwareError: A drive does not answer.
+    HardwareError says that a drive does not answer.
     """
     for joint, angle in enumerate(angles):
         position = link.transforms[joint].motor_position(angle)

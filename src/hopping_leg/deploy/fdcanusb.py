@@ -122,8 +122,7 @@ class Fdcanusb(LineTransport):
 class SerialSensor:
     """A sensor's serial line, on which every line begins with a number; never waits.
 
-    Raises:
-        HardwareError: The port is missing, in use or cannot be opened.
+    HardwareError says that the port is missing, in use or cannot be opened.
     """
 
     def __init__(self, path: str, baud: float) -> None:

@@ -46,8 +46,7 @@ _DRIVE_COLUMNS = (
 def columns(controller: Controller) -> tuple[str, ...]:
     """Return the columns of a run's recording; the controller's own come last.
 
-    Raises:
-        ControllerError: It names one of the loop's for its own.
+    ControllerError says that it names one of the loop's for its own.
     """
     drives = tuple(f"{joint}_{name}" for name in _DRIVE_COLUMNS for joint in JOINTS)
     names, own = (*_LOOP, *_HEIGHTS, *_TIMES, *drives), _internal_names(controller)

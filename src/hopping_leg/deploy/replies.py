@@ -105,8 +105,7 @@ class Question:
 def read_registers(data: bytes) -> dict[int, Any]:
     """Return the registers that a drive's answer tells.
 
-    Raises:
-        Exception: The frame is damaged; the client library's parser raises many types.
+    Where it is damaged, the client library's parser raises exceptions of many types.
     """
     values = {}
     for part in multiplex.parse_frame(data):

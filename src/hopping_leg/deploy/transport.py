@@ -43,12 +43,7 @@ class Transport(Protocol):
 
 
 def open_transport(name: str) -> Transport:
-    """Open what a name means.
-
-    Raises:
-        UsageError: It names no transport.
-        HardwareError: It is in use, or cannot be opened.
-    """
+    """Open what a name means, or raise UsageError; HardwareError where it cannot be opened."""
     if "/" in name:
         if not Path(name).exists():
             raise UsageError(f"There is no serial port {name}; give {_FORMS}.")
@@ -63,11 +58,7 @@ def open_transport(name: str) -> Transport:
 
 
 class PythonCan:
-    """A CAN-FD bus of python-can.
-
-    Raises:
-        HardwareError: It is in use or cannot be opened.
-    """
+    """A CAN-FD bus of python-can; HardwareError says that it is in use or cannot be opened."""
 
     def __init__(self, interface: str, channel: str) -> None:
         self.trouble = ""

@@ -44,11 +44,7 @@ _NOISE = b"@#!%\x07~ moteus?"
 
 @dataclass(frozen=True)
 class Fault:
-    """One entry of a fault script.
-
-    Raises:
-        UsageError: A field has no meaning.
-    """
+    """One entry of a fault script; UsageError says which field has no meaning."""
 
     kind: str
     since: str = "powered"
@@ -460,11 +456,7 @@ class _Configuration(FaultKind, kind="configuration"):
 
 
 def load_faults(path: Path) -> tuple[Fault, ...]:
-    """Read a script.
-
-    Raises:
-        UsageError: The file is missing, no TOML, or says something that has no meaning.
-    """
+    """Read a script, or raise UsageError where it is missing, no TOML, or has no meaning."""
     try:
         content = path.read_bytes()
     except OSError as error:

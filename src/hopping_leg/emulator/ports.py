@@ -114,10 +114,8 @@ class LinePort(ABC):
 class PtyPort(LinePort):
     """A terminal that passes for an fdcanusb.
 
-    It is also offered under the path ``link``, which outlives a pulled plug.
-
-    Raises:
-        UsageError: Another emulator has the link, or it is a file of another kind.
+    It is also offered under the path ``link``, which outlives a pulled plug. UsageError says that
+    another emulator has the link, or that it is a file of another kind.
     """
 
     def __init__(self, link: Path | None = None) -> None:

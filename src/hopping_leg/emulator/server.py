@@ -52,9 +52,7 @@ class EmulatorConfig:
     def build(self) -> EmulatedRobot:
         """Return the emulated robot.
 
-        Raises:
-            RobotError: The robot is unknown, wrong or cannot stand.
-            UsageError: The pose is unknown.
+        RobotError is for a robot that is unknown, wrong or cannot stand, UsageError for the pose.
         """
         robot = load_robot(self.robot)
         robot.require_leg()
@@ -69,20 +67,12 @@ class EmulatorConfig:
         )
 
     def open(self) -> PtyPort:
-        """Return the adapter.
-
-        Raises:
-            UsageError: The link is another emulator's, or no link.
-        """
+        """Return the adapter; UsageError where the link is another emulator's, or no link."""
         return PtyPort(self.link)
 
 
 def posture(robot: Robot, pose: str) -> Array:
-    """Return the joint angles of a named or given pose, rad, (2,).
-
-    Raises:
-        UsageError: There is no such pose.
-    """
+    """Return the joint angles of a named or given pose, rad, (2,); UsageError for any other."""
     if pose == "zero":
         return np.zeros(2)
     if pose == "stand":

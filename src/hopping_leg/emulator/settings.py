@@ -29,10 +29,8 @@ DEFAULTS: dict[str, int | float] = {
 class Settings(dict[str, int | float]):
     """One drive's configuration; changes are lost with power unless saved.
 
-    What is given differs from the defaults, already in flash.
-
-    Raises:
-        UsageError: A name is unknown or a value has no meaning.
+    What is given differs from the defaults, already in flash. UsageError says that a name is
+    unknown or a value has no meaning.
     """
 
     def __init__(self, **changes: float) -> None:

@@ -132,10 +132,8 @@ def predict(runs: Sequence[Run]) -> list[Prediction]:
 def compare(file: Path, runs: Sequence[Run]) -> tuple[list[Prediction], list[str]]:
     """Return what an evaluation's JSON predicts, with what later runs measured of it.
 
-    Behind it are sentences: what differs, and whether reality is as predicted.
-
-    Raises:
-        UsageError: The file holds no predictions, or nothing of the runs was predicted.
+    Behind it are sentences: what differs, and whether reality is as predicted. UsageError says that
+    the file holds no predictions, or that nothing of the runs was predicted.
     """
     rows = parse_json(file.read_bytes(), str(file)).get("predictions") or None
     if not isinstance(rows, list):

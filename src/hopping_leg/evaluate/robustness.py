@@ -59,14 +59,9 @@ def run_suite(
     suite: Suite,
     on_progress: Callable[[str, float], None] = lambda _label, _share: None,
 ) -> dict[str, Any]:
-    """Let every controller meet every axis.
+    """Let every controller meet every axis; return ``scores``, ``levels`` and more as JSON values.
 
-    Returns:
-        ``scores``, ``levels``, ``axes``, ``conditions``, ``versions`` and
-        ``notes``, as JSON values.
-
-    Raises:
-        UsageError: A command is out of an entry's range, or a name is taken twice.
+    UsageError says that a command is out of an entry's range, or a name is taken twice.
     """
     check_entries(entries, suite.commands)
     parts = (NOMINAL, *suite.axes)

@@ -177,8 +177,7 @@ JOINT = Axis("joint", "all axes at once, this share of the way to points of thei
 def axes_named(names: Sequence[str]) -> tuple[Axis, ...]:
     """Return the axes of some names in their own order, ``JOINT`` last; without names, all.
 
-    Raises:
-        UsageError: There is no axis of a name.
+    UsageError says that there is no axis of a name.
     """
     every = {axis.name: axis for axis in (*AXES, JOINT)}
     for name in names:

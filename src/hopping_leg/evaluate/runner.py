@@ -61,8 +61,7 @@ def load_entries(names: Sequence[str], robot: Robot, rate: float) -> list[Entry]
 def check_entries(entries: Sequence[Entry], commands: Sequence[float]) -> None:
     """Check that there is something to judge, under names that differ, and what it is asked for.
 
-    Raises:
-        UsageError: There is not, or a height, m, is outside of the range of an entry's training.
+    UsageError says what is not so, e.g. a height, m, beyond the range of an entry's training.
     """
     labels = [entry.label for entry in entries]
     if not labels:

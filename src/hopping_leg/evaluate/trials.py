@@ -48,8 +48,7 @@ def scaled(heights: Sequence[float], robot: Robot) -> tuple[float, ...]:
 def paper_trials(robot: Robot, commands: Sequence[float] | None = None) -> list[Trial]:
     """Return all trials of an evaluation; ``commands``, m, are those of the fixed ones.
 
-    Raises:
-        UsageError: A command is out of the leg's reach.
+    UsageError says that a command is out of the leg's reach.
     """
     chosen = choose_commands(robot, commands)
     trials = [Trial(((c, FIXED_SECONDS),), "fixed") for c in chosen]
@@ -65,8 +64,7 @@ def choose_commands(
 ) -> tuple[float, ...]:
     """Return rising heights to hop to, m: those asked for, or the paper's scaled to the leg.
 
-    Raises:
-        UsageError: No controller can make this leg hop to one of them, or none hops even once.
+    UsageError says that none can make this leg hop to one of them, or that none hops even once.
     """
     if repeats < 1:
         raise errors.UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
@@ -106,11 +104,7 @@ class Run:
 
 
 def floor_robot(robot: Robot, floor: str) -> Robot:
-    """Return the robot on another floor.
-
-    Raises:
-        UsageError: There is no such floor.
-    """
+    """Return the robot on another floor; UsageError where there is no such floor."""
     if floor not in FLOORS:
         raise errors.UsageError(errors.unknown_name("floor", floor, FLOORS))
     if floor == "soft":

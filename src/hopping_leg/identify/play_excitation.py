@@ -34,10 +34,7 @@ def play(
     from that report, once per row. Height and contact, where there is a rail, are the truth. The
     robot plays the real leg with its ``reality``; ``believed`` is the robot file that the recording
     is filed under; the seed is of jitter and noise; ``on_tick`` gets ticks done and in all.
-
-    Raises:
-        PhysicsError: The simulation became unstable.
-        RecordingError: The recording cannot be believed.
+    PhysicsError says that the simulation became unstable, RecordingError that none can believe it.
     """
     gains = gains or JointGains()
     fixed = excitation.rig == "fixed-base"

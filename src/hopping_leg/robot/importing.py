@@ -55,8 +55,7 @@ class ImportedRobot:
 def read_values(words: tuple[str, ...]) -> dict[str, float]:
     """Return numbers given as ``path=value``; ``motor.X`` stands for both joints' ``motor.X``.
 
-    Raises:
-        UsageError: A path or value is none.
+    UsageError says that a path or value is none.
     """
     valid, values = _units(), dict[str, float]()
     for word in words:

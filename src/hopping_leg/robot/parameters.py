@@ -235,11 +235,7 @@ class Robot:
         return self.straight_height / PAPER_HEIGHT
 
     def require_leg(self) -> None:
-        """Refuse a pendulum where a robot has to stand or hop.
-
-        Raises:
-            RobotError: The robot is no leg.
-        """
+        """Refuse a pendulum, where a robot has to stand or hop, by a RobotError."""
         if self.kind != "leg":
             raise RobotError(
                 f"{self.name} is a {self.kind} and cannot hop; name a leg, e.g. legv2, or use it"

@@ -107,11 +107,7 @@ def _stands(robot: Robot) -> bool:
 
 
 def check_physics(robot: Robot, origin: str) -> None:
-    """Check that fields do not contradict each other.
-
-    Raises:
-        RobotError: Naming the fields that contradict each other.
-    """
+    """Refuse fields that contradict each other, by a RobotError that names them."""
     hip, knee = robot.hardware.servos
     if robot.kind not in KINDS:
         raise RobotError(f"{origin}: 'kind': {unknown_name('kind of robot', robot.kind, KINDS)}")

@@ -135,8 +135,7 @@ class LiveSimulation:
     def begin(self, names: tuple[str, ...], robot_name: str) -> None:
         """Begin anew with controllers on a robot; another robot has its own settings.
 
-        Raises:
-            UsageError, RobotError: As for the constructor; everything stays as it was.
+        Errors are those of the constructor; everything stays as it was.
         """
         robot = load_robot(robot_name)
         robot.require_leg()

@@ -229,9 +229,8 @@ class RecorderSource:
     def advance(self, seconds: float) -> None:
         """Read what is new.
 
-        Raises:
-            RobotError: The run's robot is no shipped one and none was given.
-            TraceError: The file is no flight recording.
+        RobotError says that the run's robot is no shipped one and none was given, TraceError that
+        the file is no flight recording.
         """
         self._wait -= seconds
         if self._wait <= 0:

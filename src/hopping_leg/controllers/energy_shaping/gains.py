@@ -146,8 +146,7 @@ class GainFile:
 def load_gains(name_or_path: str | Path = TUNED, robot: Robot | None = None) -> GainFile:
     """Load a tuned set by shipped name, that of a robot if it has its own, or from a TOML file.
 
-    Raises:
-        UsageError: The file is missing or not a gain file; the message names the field.
+    UsageError says that the file is missing or no gain file, and names the field.
     """
     name = str(name_or_path)
     source: Any = Path(name) if name.endswith(".toml") else _SHIPPED / f"{name}.toml"
