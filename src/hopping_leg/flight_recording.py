@@ -85,11 +85,7 @@ class FlightRecorderTail:
         return os.fstat(self._file.fileno()).st_nlink == 0
 
     def rows(self) -> Array:
-        """Return the rows that were written since the last call, (ticks, columns).
-
-        Raises:
-            TraceError: The file is no flight recording.
-        """
+        """Return the rows since the last call, (ticks, columns); TraceError for any other file."""
         content = self._rest + self._file.read()
         at = 0
         if not self._begun:
@@ -132,8 +128,7 @@ class FlightRecorderTail:
 def read_recording(path: Path) -> tuple[FlightRecorderTail, Array]:
     """Return a flight recording and its rows, (ticks, columns), also of a process that was killed.
 
-    Raises:
-        TraceError: The file is missing, or no flight recording.
+    TraceError says that the file is missing, or no flight recording.
     """
     with contextlib.closing(FlightRecorderTail(path)) as box:
         rows = box.rows()
@@ -145,10 +140,8 @@ def read_recording(path: Path) -> tuple[FlightRecorderTail, Array]:
 def recover(path: Path) -> trace.Trace:
     """Return the common trace of a run from its flight recording.
 
-    Columns that a trace may rely on and the recording lacks hold NaN.
-
-    Raises:
-        TraceError: The file is missing, no flight recording, or holds no tick.
+    Columns that a trace may rely on and the recording lacks hold NaN. TraceError says that the
+    file is missing, no flight recording, or holds no tick.
     """
     box, rows = read_recording(path)
     if not len(rows):

@@ -67,11 +67,7 @@ class Trace:
     """Robot, its digest, controller, seed, rate, versions."""
 
     def column(self, name: str) -> Array:
-        """Return a column as floats, (ticks,).
-
-        Raises:
-            TraceError: The trace has no such column, or it holds no numbers.
-        """
+        """Return a column as floats, (ticks,); TraceError if it is missing or holds no numbers."""
         if name not in self.table.columns:
             raise TraceError(
                 f"The trace has no column '{name}'; it has: {', '.join(self.table.columns)}."
@@ -90,11 +86,7 @@ class Trace:
 
     @staticmethod
     def load(path: Path) -> "Trace":
-        """Read a trace.
-
-        Raises:
-            TraceError: The file is missing, truncated, foreign or of another schema.
-        """
+        """Read a trace; TraceError where it is missing, truncated, foreign or of another schema."""
         try:
             content = path.read_bytes()
         except FileNotFoundError as error:

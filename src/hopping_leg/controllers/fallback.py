@@ -67,9 +67,7 @@ def with_fallback(controller: Controller, robot: Robot) -> Controller:
     """Return a policy with what its robot's file names as ``hardware.fallback`` behind it.
 
     Other controllers, and policies for a robot that names none, are returned as they are.
-
-    Raises:
-        UsageError: There is no such controller.
+    UsageError says that there is no such controller.
     """
     if not isinstance(controller, Policy) or not robot.hardware.fallback:
         return controller

@@ -18,14 +18,11 @@ from hopping_leg.sim.channel import Measurement
 
 @dataclass(frozen=True)
 class JointGains:
-    """Gains of hip and knee.
+    """Gains of hip and knee; UsageError refuses a negative one.
 
     The defaults are chosen here, as the paper prints none: stiff enough to move, soft enough for
     200 Hz and milliseconds of latency with the smallest inertia that leg V2 is said to have
     (Table I's shank).
-
-    Raises:
-        UsageError: A gain is negative.
     """
 
     stiffness: tuple[float, float] = (20.0, 12.0)

@@ -218,11 +218,7 @@ class Policy:
             self.scale = robot.size
 
     def check_robot(self, robot: Robot, rate: float, *, other: OtherRobot = "refuse") -> None:
-        """Tell the policy its robot, and make sure that it was trained for that and the rate, Hz.
-
-        Raises:
-            PolicyError: The rate differs, or the robot where that is refused.
-        """
+        """Tell the policy its robot; PolicyError for another rate, Hz, or a robot to be refused."""
         trained = self.card.rate
         if rate != trained:
             raise PolicyError(

@@ -43,9 +43,8 @@ def controller_names() -> list[str]:
 def load_policy(name_or_path: str | Path) -> Policy:
     """Load a shipped policy by name or a policy file.
 
-    Raises:
-        PolicyError: The file is missing, truncated or foreign.
-        UsageError: There is no such shipped policy.
+    PolicyError says that the file is missing, truncated or foreign, UsageError that no policy is
+    called so.
     """
     name = str(name_or_path)
     if name in shipped_policies():

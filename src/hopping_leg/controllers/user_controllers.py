@@ -98,8 +98,8 @@ def is_user_controller(name: str) -> bool:
 def load_user_controller(name: str, robot: Robot, rate: float) -> UserController:
     """Make a controller from ``path/to/file.py:Class`` or ``module:Class``; rate is in Hz.
 
-    Raises:
-        ControllerError: There is no such file, module or class, it fails, or is no controller.
+    ControllerError says that there is no such file, module or class, that it fails, or that it is
+    no controller.
     """
     module, kind = _find(name)
     with guarded(name, f"could not be made as {name.rpartition(':')[2]}(robot, rate={rate:g})"):

@@ -73,8 +73,7 @@ Rows = dict[str, list[Tree]]
 def to_mcap(trace: Trace) -> bytes:
     """Return a trace as an MCAP file; what is missing in a column is NaN.
 
-    Raises:
-        TraceError: The trace has no time, or one before 1970.
+    TraceError says that the trace has no time, or one before 1970.
     """
     from mcap_ros2.writer import Writer
     from rosbags.typesys import Stores, get_typestore
@@ -124,11 +123,7 @@ def _arrays(
 
 
 def bag_files(path: Path) -> list[Path]:
-    """Return the files of a bag; none where a path is no bag.
-
-    Raises:
-        OSError: It cannot be read.
-    """
+    """Return the files of a bag, none of what is no bag; OSError where it cannot be read."""
     if path.is_dir():
         return sorted(file for file in path.iterdir() if {".mcap", ".db3"} & {*file.suffixes})
     with path.open("rb") as file:
@@ -139,10 +134,8 @@ def read_bag(path: Path, origin: str) -> tuple[pl.DataFrame, Tree]:
     """Return the joints of a bag as a table; of one that was made of a trace also its header.
 
     The table has ``time_s``, counted from the whole second of the first row, and the columns of a
-    trace where topics and joints are called as in ``COLUMNS``.
-
-    Raises:
-        RecordingError: The bag is damaged or holds no joint states.
+    trace where topics and joints are called as in ``COLUMNS``. RecordingError says that the bag is
+    damaged or holds no joint states.
     """
     try:
         states, numbers = _messages(path)

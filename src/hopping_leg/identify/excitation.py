@@ -75,9 +75,8 @@ def demand(robot: Robot, rig: Rig, position: Array, rate: float) -> Demand:
 def possible_demand(template: Template, robot: Robot, rate: float) -> tuple[Array, Demand]:
     """Sample a template at a rate, Hz; return times, s, and what it asks of the joints.
 
-    Raises:
-        UsageError: The leg cannot follow, for reach, stops, ground or the motors' torque-speed
-            lines; names joint and time.
+    UsageError says at which joint and time the leg cannot follow, for reach, stops, ground or the
+    motors' torque-speed lines.
     """
     time = np.arange(round(template.duration * rate)) / rate
     if len(time) < 3:

@@ -127,8 +127,7 @@ def make_recording(
 def load_recording(path: str | Path) -> Recording:
     """Load native Parquet, a table or bag with a sidecar, ``run.toml``, or a known rig's log.
 
-    Raises:
-        RecordingError: It cannot be read or believed; names file, column and row.
+    RecordingError says which file, column and row cannot be read or believed.
     """
     path = Path(path)
     origin, sidecar = str(path), sidecar_path(path)

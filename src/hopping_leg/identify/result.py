@@ -244,11 +244,8 @@ def save_robot(identified: Identified, path: Path, origin: str | Path) -> None:
 
     The delay of the recordings' loop becomes the robot's latency, with which training simulates it.
     The stem of the ``.toml`` file is the robot's name; ``origin``, name or path of the robot that
-    the fit began with, gives all other numbers.
-
-    Raises:
-        RobotError: The identified values make no valid robot; nothing is written.
-        TraceError: The file cannot be written.
+    the fit began with, gives all other numbers. RobotError says that the identified values make no
+    valid robot, TraceError that the file cannot be written; then nothing is.
     """
     stated = load_tree(origin)
     tree = {key: value for key, value in stated.items() if key != "reality"}
@@ -269,9 +266,8 @@ def save_robot(identified: Identified, path: Path, origin: str | Path) -> None:
 def posterior_robots(path: Path, robot: Robot) -> tuple[Robot, ...]:
     """Return what an identification's draws, stored as JSON, make of the robot that it wrote.
 
-    Raises:
-        UsageError: The file is none such, has no draws or is of another robot.
-        RobotError: A draw contradicts the robot.
+    UsageError says that the file is none such, has no draws or is of another robot, RobotError that
+    a draw contradicts the robot.
     """
     tree, robots = parse_json(path.read_bytes(), str(path)), list[Robot]()
     reality = replace(robot.reality, latency=NO_MISMATCH.latency)

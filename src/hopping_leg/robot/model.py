@@ -77,18 +77,13 @@ def get_spec(
 def build_model(robot: Robot, timestep: float = TIMESTEP) -> mujoco.MjModel:
     """Compile a robot's model; generalised coordinates are (rail height, hip, knee).
 
-    Raises:
-        RobotError: MuJoCo refuses the parameters, e.g. a mass that is too small.
+    RobotError says that MuJoCo refuses the parameters, e.g. a mass that is too small.
     """
     return compile_spec(get_spec(robot, timestep), robot.name)
 
 
 def compile_spec(spec: mujoco.MjSpec, name: str) -> mujoco.MjModel:
-    """Compile an edited model of the robot ``name``.
-
-    Raises:
-        RobotError: MuJoCo refuses the parameters, e.g. a mass that is too small.
-    """
+    """Compile an edited model of the robot ``name``; RobotError as in ``build_model``."""
     try:
         return spec.compile()
     except ValueError as error:

@@ -32,10 +32,8 @@ def shipped_robots() -> list[str]:
 def load_robot(name_or_path: str | Path) -> Robot:
     """Load a robot by shipped name, e.g. ``"legv2"``, or from a file that ends in ``.toml``.
 
-    Doubts about a file's numbers (``doubts``) are logged as warnings, once.
-
-    Raises:
-        RobotError: Naming the file, the field and what was valid.
+    Doubts about a file's numbers (``doubts``) are logged as warnings, once. RobotError names the
+    file, the field and what was valid.
     """
     origin = str(name_or_path)
     robot = robot_from_tree(_read(origin), origin)
@@ -47,10 +45,9 @@ def load_robot(name_or_path: str | Path) -> Robot:
 
 
 def robot_from_tree(tree: Tree, origin: str) -> Robot:
-    """Return the robot that tables describe, ``extends`` resolved; messages name ``origin``.
+    """Return the robot that tables describe, ``extends`` resolved.
 
-    Raises:
-        RobotError: Naming origin, field and what was valid.
+    RobotError names ``origin``, the field and what was valid.
     """
     plain = _with_values(Robot, _complete(tree, origin), origin)
     robot = read_dataclass(Robot, plain, origin, error=RobotError)
@@ -63,8 +60,7 @@ def robot_from_tree(tree: Tree, origin: str) -> Robot:
 def parent_robot(name_or_path: str | Path) -> str | None:
     """Return the name or path of the robot that a file extends, None if it stands alone.
 
-    Raises:
-        RobotError: The file is missing or not TOML.
+    RobotError says that the file is missing or not TOML.
     """
     return _parent(_read(str(name_or_path)), str(name_or_path))[0] or None
 
@@ -72,8 +68,7 @@ def parent_robot(name_or_path: str | Path) -> str | None:
 def load_tree(name_or_path: str | Path) -> Tree:
     """Return a robot file as nested tables with units and sources, ``extends`` resolved.
 
-    Raises:
-        RobotError: The file, or one that it extends, is missing or not TOML.
+    RobotError says that the file, or one that it extends, is missing or not TOML.
     """
     return _complete(_read(str(name_or_path)), str(name_or_path))
 
@@ -81,8 +76,7 @@ def load_tree(name_or_path: str | Path) -> Tree:
 def doubts(name_or_path: str | Path) -> list[str]:
     """Return sentences about a valid robot file's numbers that may not fit each other.
 
-    Raises:
-        RobotError: As ``load_robot``.
+    RobotError is raised as by ``load_robot``.
     """
     origin = str(name_or_path)
     own = _read(origin)

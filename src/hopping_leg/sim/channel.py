@@ -27,8 +27,7 @@ _BLOCK_SIZE = 16384
 class NoiseAndDelay:
     """How a leg's sensors and motors deceive its controller; the defaults are the paper's.
 
-    Raises:
-        UsageError: A value has no meaning.
+    UsageError says that a value has no meaning.
     """
 
     joint_noise: float = 0.05

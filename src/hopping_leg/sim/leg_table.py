@@ -59,10 +59,7 @@ def leg_table(
     """Return the rows of robots for a physics step, s; (n,) of ``LEG``.
 
     A robot's ``reality`` holds. A ``fixed_base`` stays where it is and nothing touches the ground.
-
-    Raises:
-        RobotError: A transmission is too stiff for the physics step, or has backlash but no
-            stiffness.
+    RobotError says that a transmission is too stiff for the step, or has backlash but no stiffness.
     """
     distinct = {id(robot): robot for robot in robots}  # many times the same one
     rows = {key: _row(robot, timestep, fixed_base) for key, robot in distinct.items()}

@@ -49,11 +49,7 @@ RANDOMIZABLE = (
 
 @dataclass(frozen=True)
 class Range:
-    """Where a number of a robot file may lie.
-
-    Raises:
-        UsageError: The range is empty, or logarithmic and not positive.
-    """
+    """Where a number of a robot file may lie; UsageError where it can lie nowhere."""
 
     path: str
     """Dotted path in the file."""
@@ -156,9 +152,8 @@ def sample(
 ) -> tuple[Robot, ...]:
     """Return ``count`` variants of a robot, each with its own numbers, drawn range by range.
 
-    Raises:
-        UsageError: A range's number may not differ from leg to leg.
-        RobotError: A drawn number contradicts the robot.
+    UsageError names a number that may not differ from leg to leg, RobotError a drawn one that
+    contradicts the robot.
     """
     for spread in ranges:
         if spread.path not in RANDOMIZABLE:
@@ -243,11 +238,7 @@ class Twin:
     tree: Tree
 
     def save(self, path: Path) -> None:
-        """Write the robot file.
-
-        Raises:
-            TraceError: The file cannot be written.
-        """
+        """Write the robot file, or raise TraceError."""
         write_atomically(path, robot_text(self.tree).encode())
 
 
@@ -255,9 +246,7 @@ def draw_twin(seed: int, base: str = "legv2", ranges: Sequence[Range] = TWIN_RAN
     """Draw a twin of a robot; the same seed, 0 or more, gives the same twin.
 
     ``base`` is the shipped robot or file that it extends: what is believed before identification.
-
-    Raises:
-        RobotError: There is no such robot, or a drawn number contradicts it.
+    RobotError says that there is none, or that a drawn number contradicts it.
     """
     rng = np.random.default_rng(seed)
     parent = base if base in shipped_robots() else str(Path(base).resolve())
