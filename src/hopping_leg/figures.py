@@ -49,11 +49,8 @@ def rgb(colour: str) -> tuple[int, int, int]:
     return red, green, blue
 
 
-TORQUE_MAP = "PuOr_r"
-"""Diverging and colour-blind safe; white is no torque."""
-
-WIDTH = 8.0
-"""Width of a figure, inches."""
+TORQUE_MAP = "PuOr_r"  # Diverging and colour-blind safe; white is no torque
+WIDTH = 8.0  # Width of a figure, inches
 
 _LOOK = {
     "font.size": 9,

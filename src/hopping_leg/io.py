@@ -54,8 +54,7 @@ def write_json(path: Path, value: object) -> None:
     write_atomically(path, f"{text}\n".encode())
 
 
-_MOST_DIGITS = 300
-"""Of an integer; longer ones do not fit the numbers that they are computed with."""
+_MOST_DIGITS = 300  # Of an integer; longer ones do not fit the numbers that they are computed with
 
 
 def parse_json(

@@ -12,8 +12,7 @@ from filelock import BaseFileLock, FileLock, Timeout
 from hopping_leg.errors import HoppingLegError
 from hopping_leg.io import safe_file_name
 
-FOLDER_LOCK = ".lock"
-"""Name of the file that says who works in a folder."""
+FOLDER_LOCK = ".lock"  # Name of the file that says who works in a folder
 
 _MASTERS = ("/dev/ptmx", "/dev/pts/ptmx")
 

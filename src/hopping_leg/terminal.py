@@ -9,8 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 _LINE_SECONDS = 30.0
-_PACE_SECONDS = 600.0
-"""Latest time whose pace tells the time left, s."""
+_PACE_SECONDS = 600.0  # Latest time whose pace tells the time left, s
 
 
 def plain_console(*, stderr: bool = False, quiet: bool = False) -> Console:

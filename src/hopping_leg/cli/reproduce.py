@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from hopping_leg.evaluate import EvaluationRun
     from hopping_leg.identify.recording import Recording
 
-COMMANDS = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)
-"""Apex heights at which the twin is tried, m."""
+COMMANDS = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)  # Apex heights at which the twin is tried, m
 
 _RECORDED = 30.0  # s on each rig
 _FIRST_SEED = 1000  # of noise on the twin; it chose nothing

@@ -273,8 +273,7 @@ class AnyLeg(Dated):
         return foot, self.VELOCITY_GAIN * _TURN * turned
 
 
-_TURN = np.array([-1.0, 1.0])
-"""Signs of the derivatives of cosine and sine."""
+_TURN = np.array([-1.0, 1.0])  # Signs of the derivatives of cosine and sine
 
 
 def _repeat(values: Array, count: int) -> Array32:

@@ -97,8 +97,7 @@ OtherRobot = Literal["refuse", "warn", "accept"]
 _log = logging.getLogger(__name__)
 _ROUNDING = 1e-9
 _MOST_RATE = 1e4  # Hz
-_MARGIN = 0.25
-"""Share of its range of inputs by which they may lie beyond it."""
+_MARGIN = 0.25  # Share of its range of inputs by which they may lie beyond it
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,8 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.robot import GRAVITY, Joint, Link, Robot
 
-LEAST = 1e-5
-"""What a friction or inertia without a unit is at least, where its logarithm is taken."""
-
-MOST = 3.0
-"""Largest number that a policy is told."""
+LEAST = 1e-5  # What a friction or inertia without a unit is at least, where its logarithm is taken
+MOST = 3.0  # Largest number that a policy is told
 
 MIDDLES_AND_SPREADS = np.array(
     [
@@ -34,14 +31,12 @@ MIDDLES_AND_SPREADS = np.array(
 )  # fmt: skip
 """Middle and spread of each number over the legs of the training."""
 
-COUNT = len(MIDDLES_AND_SPREADS)
-"""How many there are."""
+COUNT = len(MIDDLES_AND_SPREADS)  # How many there are
 
 USUAL = {"length": 0.29, "mass": 1.45, "time_constant": 0.03}
 """Leg V2's length, m, and mass, kg, and a ground's time constant, s, over which others are told."""
 
-FULL_TORQUE = np.array([2.2, 4.6])
-"""Joint torques of a full action over the weight times L."""
+FULL_TORQUE = np.array([2.2, 4.6])  # Joint torques of a full action over the weight times L
 
 
 def leg_length(robot: Robot) -> float:

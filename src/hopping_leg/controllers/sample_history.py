@@ -65,8 +65,7 @@ class SampleHistory:
         self.known[:], self.q[:], self.qd[:] = state["known"], state["q"], state["qd"]
 
 
-WINDOW = 11
-"""Ticks in which a late sample may still reach a ``DatedObserver``."""
+WINDOW = 11  # Ticks in which a late sample may still reach a ``DatedObserver``
 
 
 class DatedObserver:

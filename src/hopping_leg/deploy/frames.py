@@ -6,11 +6,8 @@ line may end in `` *XX``, the CRC-8 (polynomial 0x97) of all before the star.
 
 from dataclasses import dataclass
 
-BROADCAST = 0x7F
-"""Destination that every drive listens to."""
-
-REPLY_WANTED = 0x8000
-"""Bit of an arbitration id that asks for a reply."""
+BROADCAST = 0x7F  # Destination that every drive listens to
+REPLY_WANTED = 0x8000  # Bit of an arbitration id that asks for a reply
 
 _SIZES = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 

@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 _PACKAGES = ("hopping-leg", "numpy", "onnxruntime", "moteus", "python-can")
 _STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGHUP, signal.SIGTSTP)
 _LOOK_EVERY = 0.05  # s
-_PATIENCE = 0.5
-"""How long a controller may take before the leg is left to the drives' brakes, s."""
+_PATIENCE = 0.5  # How long a controller may take before the leg is left to the drives' brakes, s
 
 _BRAKES = 3  # Times that the drives are told to brake then
 _LAST_SECONDS = 0.6  # After a second signal, for the record; then the process ends

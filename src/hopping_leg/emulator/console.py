@@ -3,8 +3,7 @@
 from hopping_leg.emulator.settings import Settings
 from hopping_leg.errors import UsageError
 
-CHANNEL = 1
-"""Stream channel of the console."""
+CHANNEL = 1  # Stream channel of the console
 
 
 class Console:

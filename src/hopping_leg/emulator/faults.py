@@ -291,8 +291,7 @@ class _UnderVoltage(_OverVoltage, kind="under_voltage"):
 
 
 _SAMPLE = _POSITION, _VELOCITY, _TORQUE = 0x001, 0x002, 0x003
-_MULTIPLEX_ID = 0x110
-"""Registers, as numbers: kinds are listed without the client library."""
+_MULTIPLEX_ID = 0x110  # Registers, as numbers: kinds are listed without the client library
 
 
 class _Lie(FaultKind):

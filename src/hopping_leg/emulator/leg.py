@@ -16,8 +16,7 @@ from hopping_leg.robot.model_mismatch import STANDING_NOISE, SensorMismatch
 from hopping_leg.robot.parameters import Joint, Robot
 from hopping_leg.sim import LegSimulator
 
-TIMESTEP = 5e-4
-"""Period of the drives' control, s; the physics steps more often within it."""
+TIMESTEP = 5e-4  # Period of the drives' control, s; the physics steps more often within it
 
 
 class EmulatedLeg:

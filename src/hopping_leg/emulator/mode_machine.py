@@ -24,17 +24,13 @@ class Notice(IntEnum):
 BETWEEN = (DriveMode.FAULT, DriveMode.ENABLING, DriveMode.CALIBRATING, DriveMode.CALIBRATED)
 """Modes that no command can ask for."""
 
-MODES = frozenset(DriveMode)
-"""All that a register may hold."""
-
-CONTROLLING = MODES - {DriveMode.STOPPED, *BETWEEN}
-"""Modes in which the output stage is powered."""
+MODES = frozenset(DriveMode)  # All that a register may hold
+CONTROLLING = MODES - {DriveMode.STOPPED, *BETWEEN}  # Modes in which the output stage is powered
 
 
 _ENABLING_TIME = 0.001  # From stopped to calibrating, s
 
-STARTING_TIME = 0.0085
-"""From stopped to the commanded mode, s."""
+STARTING_TIME = 0.0085  # From stopped to the commanded mode, s
 
 
 class ModeMachine:

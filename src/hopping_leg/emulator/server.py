@@ -21,8 +21,7 @@ from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, kinematics, load_robot
 
-_STANDING = 0.69
-"""Length of a leg that stands over the straight leg's, foot below the hip."""
+_STANDING = 0.69  # Length of a leg that stands over the straight leg's, foot below the hip
 
 POSES = ("stand", "zero")
 """Named poses; ``zero`` is the leg straight down, where the joints' angles are zero."""

@@ -23,8 +23,7 @@ from hopping_leg.robot.parameters import JOINTS, Robot
 from hopping_leg.sim import LOADS
 from hopping_leg.trace import Trace
 
-REVERSAL = 4.0
-"""Change of a joint's commanded torque within a tick that counts as a reversal, N m."""
+REVERSAL = 4.0  # Change of a joint's commanded torque within a tick that counts as a reversal, N m
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,8 +16,7 @@ from hopping_leg.evaluate.trials import Run
 from hopping_leg.io import plain
 from hopping_leg.robot import Robot
 
-SCHEMA = 2
-"""Version of the JSON, raised when a name changes its meaning."""
+SCHEMA = 2  # Version of the JSON, raised when a name changes its meaning
 
 _WHOLE = ("height_m", "foot_clearance_m", "hip_torque_nm", "knee_torque_nm")
 

@@ -21,17 +21,10 @@ from hopping_leg.evaluate import metrics, runner, statistics
 from hopping_leg.evaluate.robustness_axes import AXES, NOMINAL, Axis, Case
 from hopping_leg.evaluate.runner import Entry, check_entries
 
-SCHEMA = 2
-"""Version of the JSON, raised when a name changes its meaning."""
-
-TOLERANCE = 0.02
-"""Largest magnitude of the median apex minus the command in a successful trial, m."""
-
-JOINT_POINTS = 4
-"""Points of the hypercube per command and seed."""
-
-PUSH_SECONDS = 0.02
-"""Duration of each push, s."""
+SCHEMA = 2  # Version of the JSON, raised when a name changes its meaning
+TOLERANCE = 0.02  # Largest magnitude of the median apex minus the command in a successful trial, m
+JOINT_POINTS = 4  # Points of the hypercube per command and seed
+PUSH_SECONDS = 0.02  # Duration of each push, s
 
 GROUND_SECONDS, SWITCH_SECONDS = 1.0, 2.5
 """Time between two steps of the ground, and of the command, s."""

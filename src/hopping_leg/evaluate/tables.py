@@ -71,8 +71,7 @@ def _columns(names: str) -> list[Column]:
 
 _HOW = "controller command_m"
 _SHORT = f"{_HOW} median_error_m std_m hops skipped_hops flight_fraction min_base_height_m"
-SHORT = _columns(f"{_SHORT} body_contacts")
-"""What the terminal shows of the summary."""
+SHORT = _columns(f"{_SHORT} body_contacts")  # What the terminal shows of the summary
 
 _ERROR = "median_error_m median_error_low_m median_error_high_m"
 

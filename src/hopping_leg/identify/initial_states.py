@@ -132,8 +132,7 @@ def _filled(recording: Recording, quantity: str) -> Array:
     return values
 
 
-SETTLING = 1.0
-"""Beginning of a recording from which its offsets are found, s."""
+SETTLING = 1.0  # Beginning of a recording from which its offsets are found, s
 _SPAN = 0.2  # over which momentum is balanced, s
 _GRID = 2e-3
 _ROWS = round(_SPAN / _GRID)

@@ -14,8 +14,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.identify import excitation, recording_format
 from hopping_leg.robot import Robot, kinematics
 
-DURATION = 240.0
-"""Duration of the paper's recordings, s."""
+DURATION = 240.0  # Duration of the paper's recordings, s
 AMPLITUDES, PERIODS, SWINGS = (0.15, 0.1, 0.05), (0.75, 0.5, 0.25), (10.0, 20.0)
 """A in m, T1 and T2 in s of the paper's recordings."""
 LAB_MARGIN = 0.005

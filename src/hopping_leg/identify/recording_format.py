@@ -47,8 +47,7 @@ where the time stamp is a guess; ``height_m`` is the hip axis above the ground, 
 base above an unknown zero, ``contact`` the foot's, ``phase`` what the rig's controller did.
 """
 
-MEASURED = PAIRS["position"] + PAIRS["velocity"] + PAIRS["torque"]
-"""Columns that sensors filled."""
+MEASURED = PAIRS["position"] + PAIRS["velocity"] + PAIRS["torque"]  # Columns that sensors filled
 
 
 def float_column(table: pl.DataFrame, column: str) -> Array:

@@ -22,8 +22,7 @@ from hopping_leg.robot.model_mismatch import NO_MISMATCH
 from hopping_leg.robot.robot_checks import check_physics, numbers
 
 _DELAY, _LATENCY = "drive.delay", "reality.latency.command"
-_WORSE = 1.01
-"""Geometric mean of errors after the fit over those before, from which on it is worse."""
+_WORSE = 1.01  # Geometric mean of errors after the fit over those before, from which on it is worse
 PARAMETERS = ("parameter", "start", "identified", "95 % interval", "unit")
 """What is shown of each parameter."""
 ERRORS = ("on held-out data, rms", "before: hip", "knee", "after: hip", "knee", "unit")

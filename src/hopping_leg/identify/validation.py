@@ -12,8 +12,7 @@ from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import PAIRS, Pair
 from hopping_leg.identify.simulate import Window, WindowSimulator, cut
 
-HORIZONS = (0.2, 0.5, 1.0)
-"""How far to predict without looking at the recording again, s."""
+HORIZONS = (0.2, 0.5, 1.0)  # How far to predict without looking at the recording again, s
 _UNSCORED = 1.0  # beginning that does not count in closed loop, s, or a quarter of a short one
 
 

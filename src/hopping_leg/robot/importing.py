@@ -19,8 +19,7 @@ from hopping_leg.robot.robot_files import load_tree
 MOTORS = {"qdd100": ("legv2", "hip"), "ak80-9": ("legv1", "hip"), "ak80-6": ("legv1", "knee")}
 """Motors by name: the shipped robot and joint whose file has their numbers."""
 
-_TEMPLATE = "legv2"
-"""Shipped robot whose file gives the order and units of numbers."""
+_TEMPLATE = "legv2"  # Shipped robot whose file gives the order and units of numbers
 _SOFT = {"hip": (0.2, 1.2), "knee": (-2.3, -0.6)}
 _INSET = 0.1  # rad, of a soft limit from its stop where leg V2's does not fit
 _RATED_SHARE = 0.375  # rated over peak torque of the qdd100

@@ -38,8 +38,7 @@ FRICTION_TIME_CONSTANT = 0.001
 FRICTION_IMPEDANCE = (0.999, 0.999, 0.001, 0.5, 2.0)
 """``solimp`` of dry friction that holds: by MuJoCo's default a joint creeps at 10 mrad/s."""
 
-_THIN = 1e-9
-"""Inertia around the axes a planar link cannot turn about only has to be valid."""
+_THIN = 1e-9  # Inertia around the axes a planar link cannot turn about only has to be valid
 
 
 def get_spec(

@@ -126,5 +126,4 @@ class ModelMismatch:
         return np.array([getattr(d.sensor, attribute) for d in (self.hip, self.knee)])
 
 
-NO_MISMATCH = ModelMismatch()
-"""Nothing that the simulator for training does not know."""
+NO_MISMATCH = ModelMismatch()  # Nothing that the simulator for training does not know

@@ -19,8 +19,7 @@ DELAY_DEPTH = 10
 _DRAWS = 8
 """Random numbers per leg and tick: four for the joints, two for the delay, two for the torques."""
 
-_BLOCK_SIZE = 16384
-"""Legs times ticks whose random numbers are drawn at once."""
+_BLOCK_SIZE = 16384  # Legs times ticks whose random numbers are drawn at once
 
 
 @dataclass(frozen=True)

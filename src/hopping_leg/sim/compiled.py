@@ -48,8 +48,7 @@ def _cache_folder() -> str | None:
     return None
 
 
-FOLDER = _cache_folder()
-"""Where the compiled code lies; None if it lives as long as the process."""
+FOLDER = _cache_folder()  # Where the compiled code lies; None if it lives as long as the process
 
 
 def compiled(function: Function) -> Function:

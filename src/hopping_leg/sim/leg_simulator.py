@@ -17,8 +17,7 @@ from hopping_leg.sim.compiled import announce
 from hopping_leg.sim.leg_table import LEG, leg_geometry, leg_table
 from hopping_leg.sim.simulator import CONTROL_RATE, Simulator
 
-_STEPS_PER_THREAD = 4000
-"""Physics steps for which it is worth waking another thread."""
+_STEPS_PER_THREAD = 4000  # Physics steps for which it is worth waking another thread
 
 
 class LegSimulator(Simulator):

@@ -226,8 +226,7 @@ MISMATCH_RANGES = (
 )
 """What the simulator for training does not know."""
 
-TWIN_RANGES = IDENTIFIABLE_RANGES + MISMATCH_RANGES
-"""The distribution of twins."""
+TWIN_RANGES = IDENTIFIABLE_RANGES + MISMATCH_RANGES  # The distribution of twins
 
 
 @dataclass(frozen=True)

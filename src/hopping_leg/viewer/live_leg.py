@@ -57,8 +57,7 @@ def default_settings(robot: Robot) -> LiveSettings:
 
 
 _ALL = slice(None)
-_IMPOSSIBLE = 1e4
-"""Joint speed that no leg reaches, rad/s."""
+_IMPOSSIBLE = 1e4  # Joint speed that no leg reaches, rad/s
 
 
 class LiveSimulation:

@@ -84,8 +84,7 @@ class Inputs:
 
 NOBODY = "nobody"  # beside the leg
 HEIGHT_STEP = 0.005  # of the slider, m
-KEY_STEP = 0.01
-"""Of the keys K and J, m; arrows are the slider's own once it has the focus."""
+KEY_STEP = 0.01  # Of the keys K and J, m; arrows are the slider's own once it has the focus
 
 
 _SETTINGS: dict[str, tuple[str, Range, float]] = {
@@ -177,11 +176,8 @@ class ReplayPanel:
         self._shown = self._replay.now
 
 
-SPEEDS = (0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0)
-"""Shown seconds per second that can be chosen."""
-
-LONGEST = 0.1
-"""Seconds that are made up for after a stall; more is left out."""
+SPEEDS = (0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0)  # Shown seconds per second that can be chosen
+LONGEST = 0.1  # Seconds that are made up for after a stall; more is left out
 
 
 class PlaybackClock:

@@ -24,8 +24,7 @@ _RULER: Colour = (90, 96, 104)
 _PLAIN: Any = {"material": "toon3", "cast_shadow": False, "receive_shadow": False}
 """Of every shape: the shading that costs least where a browser draws in software."""
 
-SECONDS = 5.0
-"""Of the curves."""
+SECONDS = 5.0  # Of the curves
 
 _GRID = np.linspace(-SECONDS, 0.0, 400)
 _LIMIT = "#9a9996"

@@ -196,8 +196,7 @@ def _load_leg(robot: str | None, header: dict[str, Any], path: Path) -> Robot:
     return leg
 
 
-_LOOK = 0.5
-"""Seconds between looks for a newer run."""
+_LOOK = 0.5  # Seconds between looks for a newer run
 
 
 class RecorderSource:

@@ -30,8 +30,7 @@ from hopping_leg.viewer import live_leg, panels, scene, tracks
 _HOST = "127.0.0.1"
 _OWN = ("localhost", "127.0.0.1", "::1")
 FRAME_RATE = 60.0
-_SLOW = 5
-"""Pictures per update of each plot and of the text; they take turns."""
+_SLOW = 5  # Pictures per update of each plot and of the text; they take turns
 _NOTICE_SECONDS = 8.0
 
 
