@@ -3,10 +3,9 @@
 from typing import Protocol
 
 from hopping_leg.arrays import Array
-from hopping_leg.sim.channel import SAMPLES, Measurement
-from hopping_leg.sim.plant import SoftLimiter
-
-__all__ = ["SAMPLES", "Controller", "Measurement", "SoftLimiter"]
+from hopping_leg.sim.channel import SAMPLES as SAMPLES
+from hopping_leg.sim.channel import Measurement as Measurement
+from hopping_leg.sim.plant import SoftLimiter as SoftLimiter
 
 
 class Controller(Protocol):

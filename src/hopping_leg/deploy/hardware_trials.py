@@ -106,7 +106,13 @@ def perform(
         if link.trouble:
             recorder.event(link_trouble=link.trouble)
         recorder.close()
-    notices += tuple(_pace(outcome, 1 / limits.period))
+    share, rate = outcome.ticks / max(outcome.ticks + outcome.skipped, 1), 1 / limits.period
+    if share < _FULL_RATE:
+        sentence = (
+            f"The loop ran at {rate * share:.0f} instead of {rate:g} Hz: this computer was late;"
+            " end other programs, or permit real-time priority."
+        )
+        notices += (sentence,)
     return _finish(outcome, recorder, path, notices)
 
 
@@ -145,16 +151,6 @@ def _run(loop: ControlLoop, signals: list[int], recording: Path) -> LoopOutcome:
 def _draw(recording: Path) -> str:
     """Return the command that writes a recording's trace and draws it."""
     return shlex.join(["hop", "report", str(recording)])
-
-
-def _pace(outcome: LoopOutcome, rate: float) -> Iterator[str]:
-    """Yield a sentence if the loop ran markedly slower than it should."""
-    share = outcome.ticks / max(outcome.ticks + outcome.skipped, 1)
-    if share < _FULL_RATE:
-        yield (
-            f"The loop ran at {rate * share:.0f} instead of {rate:g} Hz: this computer was late;"
-            " end other programs, or permit real-time priority."
-        )
 
 
 def _finish(

@@ -129,25 +129,20 @@ class MoteusLink:
 
     def _make(self, action: drive_link.Action, *, query: bool) -> list[frames.Frame]:
         """Let the client library make the frames of an action."""
-        match action:
-            case drive_link.Action.TORQUE:
-                commands = [
-                    controller.make_position(
-                        **_NO_POSITION_CONTROL,
-                        feedforward_torque=_PLACE,
-                        maximum_torque=joint.motor.torque_limit,
-                        watchdog_timeout=self.robot.hardware.watchdog,
-                        query=query,
-                    )
-                    for controller, joint in zip(
-                        self.controllers, (self.robot.hip, self.robot.knee), strict=True
-                    )
-                ]
-            case drive_link.Action.BRAKE:
-                commands = [controller.make_brake(query=query) for controller in self.controllers]
-            case drive_link.Action.STOP:
-                commands = [controller.make_stop(query=query) for controller in self.controllers]
-        return [_frame(command) for command in commands]
+        torque = _NO_POSITION_CONTROL | {"feedforward_torque": _PLACE}
+        torque["watchdog_timeout"] = self.robot.hardware.watchdog
+        frames_made = []
+        for drive, joint in zip(self.controllers, (self.robot.hip, self.robot.knee), strict=True):
+            match action:
+                case drive_link.Action.TORQUE:
+                    most = joint.motor.torque_limit
+                    command = drive.make_position(**torque, maximum_torque=most, query=query)
+                case drive_link.Action.BRAKE:
+                    command = drive.make_brake(query=query)
+                case drive_link.Action.STOP:
+                    command = drive.make_stop(query=query)
+            frames_made.append(_frame(command))
+        return frames_made
 
 
 def _with_torque(frame: frames.Frame, torque: float) -> frames.Frame:

@@ -15,7 +15,7 @@ from moteus.multiplex import RegisterSubframe, StreamSubframe, SubframeType
 from moteus.protocol import Writer, scale_register
 
 from hopping_leg.deploy import frames
-from hopping_leg.emulator import console
+from hopping_leg.emulator import settings
 from hopping_leg.emulator.drive import EmulatedDrive
 
 _MOST = 256  # Subframes that are read: a few bytes may ask for millions of registers
@@ -126,7 +126,7 @@ def answer(message: Message, drive: EmulatedDrive) -> frames.Frame | None:
 
 def _stream(message: Message, drive: EmulatedDrive, reply: ReplyWriter) -> None:
     for s in message.streams:
-        if s.channel != console.CHANNEL:
+        if s.channel != settings.CHANNEL:
             continue
         if s.type is SubframeType.STREAM_CLIENT_TO_SERVER:
             drive.console.write(s.data)

@@ -11,8 +11,8 @@ from moteus.multiplex import F32
 from moteus.protocol import Register, scale_register
 
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode
-from hopping_leg.emulator import console, mode_machine, rotor_encoder, torque_law
-from hopping_leg.emulator.settings import Settings
+from hopping_leg.emulator import mode_machine, rotor_encoder, torque_law
+from hopping_leg.emulator.settings import Console, Settings
 
 _AMBIENT = 30.0  # Temperature of the output stage, degrees C
 _LOWEST_VOLTAGE = 4.0  # Below it the firmware reports under-voltage, V
@@ -58,7 +58,7 @@ class EmulatedDrive:
     ) -> None:
         self.identity, self.settings = identity, settings
         self.encoder = rotor_encoder.RotorEncoder(settings, gear_ratio)
-        self.console = console.Console(settings)
+        self.console = Console(settings)
         self.machine = mode_machine.ModeMachine()
         self.law = torque_law.TorqueLaw(settings)
         self.command = torque_law.Command()

@@ -1,14 +1,6 @@
 """What can go wrong: an entry of a fault script says what and when, a class per kind what it does.
 
 A new kind is a subclass of ``FaultKind`` here, and a family in the study of faults.
-
-[[fault]]
-kind = "late_reply"
-since = "flight"    # the first time that the foot leaves the ground
-at = 2.0            # seconds after that
-drive = "knee"
-value = 0.012       # what it means depends on the kind: here seconds
-duration = 0.1
 """
 
 import math

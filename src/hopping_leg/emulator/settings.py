@@ -1,10 +1,12 @@
-"""What a drive can be configured to: the values of its ``conf`` tree, in RAM and in flash.
+"""What a drive can be configured to, in RAM and in flash, and the text console that asks for it.
 
 Defaults are those of firmware for the controller board r4 with what the qdd100 is delivered with;
 only values that the emulator obeys are here.
 """
 
 from hopping_leg.errors import UsageError, unknown_name
+
+CHANNEL = 1  # Stream channel of the console
 
 DEFAULTS: dict[str, int | float] = {
     "id.id": 1,
@@ -62,3 +64,40 @@ class Settings(dict[str, int | float]):
     def load(self) -> None:
         """Read flash to RAM, as after power was lost."""
         self.update(self._saved)
+
+
+class Console:
+    """A drive's console, tunnelled in frames: the host writes lines and polls for the answers."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._input = self._output = b""
+
+    def write(self, data: bytes) -> None:
+        """Take text from the host; complete lines are executed."""
+        *lines, self._input = (self._input + data).replace(b"\r", b"\n").split(b"\n")
+        for line in filter(None, map(bytes.split, lines)):
+            try:
+                answer = self._answer([word.decode("latin1") for word in line])
+            except UsageError as error:
+                answer = f"ERR {error}"
+            self._output += f"{answer}\r\n".encode()
+
+    def poll(self, most: int) -> bytes:
+        """Return the next bytes of the answers, at most so many."""
+        piece, self._output = self._output[:most], self._output[most:]
+        return piece
+
+    def _answer(self, words: list[str]) -> str:
+        match words:
+            case ["tel", "stop"]:
+                pass
+            case ["conf", "get", name]:
+                return self._settings.text(name)
+            case ["conf", "set", name, value]:
+                self._settings.set(name, value)
+            case ["conf", "write"]:
+                self._settings.save()
+            case _:
+                raise UsageError("unknown command")
+        return "OK"
