@@ -144,13 +144,8 @@ def _write(args: MovingBase | MultisineCommand) -> None:
         make = paper.moving_base
         if isinstance(args, FixedBase):
             make = partial(paper.fixed_base, swings=args.swings)
-        template = make(
-            args.amplitudes,
-            args.periods,
-            duration=args.duration,
-            margin=args.margin,
-            bend=args.bend,
-        )
+        how = {"duration": args.duration, "margin": args.margin}
+        template = make(args.amplitudes, args.periods, bend=args.bend, **how)
         if args.adapt:
             template = paper.adapt(template, robot, rate=args.rate)
     excitation = make_excitation(
@@ -199,33 +194,22 @@ def _play(args: Play) -> None:
 
 
 def _simulated(
-    args: Play,
-    robot: Robot,
-    excitations: dict[str, Excitation],
-    believed: str,
-    gains: "JointGains",
+    args: Play, robot: Robot, excitations: dict[str, Excitation], believed: str, gains: "JointGains"
 ) -> "Generator[tuple[str, Recording]]":
     from hopping_leg.identify.play_excitation import play
 
     with Progress(parts=len(excitations)) as bar:
         for number, (stem, excitation) in enumerate(excitations.items()):
-
-            def show(done: int, ticks: int, stem: str = stem) -> None:
-                bar.show(stem, done / ticks)
-
             played = play(
                 excitation, robot, believed=believed, seed=args.seed + number, gains=gains,
-                timestep=args.timestep, on_tick=show,
+                timestep=args.timestep,
+                on_tick=lambda done, ticks, stem=stem: bar.show(stem, done / ticks),
             )  # fmt: skip
             yield stem, played
 
 
 def _measured(
-    args: Play,
-    robot: Robot,
-    excitations: dict[str, Excitation],
-    believed: str,
-    gains: "JointGains",
+    args: Play, robot: Robot, excitations: dict[str, Excitation], believed: str, gains: "JointGains"
 ) -> "Generator[tuple[str, Recording]]":
     """Record motors; refuse a run that did not end by itself."""
     from hopping_leg.controllers import command_schedule, joint_pd

@@ -30,9 +30,7 @@ class Validation:
 
 
 def validate(
-    recordings: Sequence[Recording],
-    hypothesis: parameters.LegHypothesis,
-    threads: int = 0,
+    recordings: Sequence[Recording], hypothesis: parameters.LegHypothesis, threads: int = 0
 ) -> Validation:
     """Judge a hypothesis on recordings; one that is shorter than a horizon is left out there.
 

@@ -50,12 +50,7 @@ LEG = np.dtype(
 _LEAST_FRICTION = 1e-5  # MuJoCo's mjMINMU
 
 
-def leg_table(
-    robots: Sequence[Robot],
-    timestep: float,
-    *,
-    fixed_base: bool = False,
-) -> Records:
+def leg_table(robots: Sequence[Robot], timestep: float, *, fixed_base: bool = False) -> Records:
     """Return the rows of robots for a physics step, s; (n,) of ``LEG``.
 
     A robot's ``reality`` holds. A ``fixed_base`` stays where it is and nothing touches the ground.

@@ -145,10 +145,7 @@ motors that give less or more than they should, joints with friction, commands t
 
 
 def sample(
-    robot: Robot,
-    ranges: Sequence[Range],
-    count: int,
-    rng: np.random.Generator,
+    robot: Robot, ranges: Sequence[Range], count: int, rng: np.random.Generator
 ) -> tuple[Robot, ...]:
     """Return ``count`` variants of a robot, each with its own numbers, drawn range by range.
 
