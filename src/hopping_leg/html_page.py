@@ -50,7 +50,9 @@ class Column:
 
 _TABLE = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from_string("""\
 <div class="wide"><table>
-<tr>{% for c in columns %}<th>{{ unbroken(c.heading) }}</th>{% endfor %}</tr>
+<tr>
+{% for c in columns %}<th>{{ c.heading.replace(" / ", " /\N{NO-BREAK SPACE}") }}</th>{% endfor %}
+</tr>
 {% for row in rows %}
 <tr class="{{ 'first' if loop.changed(columns[0].text(row)) }}">
 {% for c in columns %}<td class="{{ 'bad' if c.bad(row) }}">{{ c.text(row) }}</td>{% endfor %}
@@ -61,9 +63,4 @@ _TABLE = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from
 
 def table(columns: Sequence[Column], rows: Sequence[Any]) -> Markup:
     """Return an HTML table; a line sets off where the first column changes."""
-    return Markup(_TABLE.render(columns=columns, rows=rows, unbroken=_unbroken) if rows else "")
-
-
-def _unbroken(heading: str) -> str:
-    """Keep a unit on the line of its slash."""
-    return heading.replace(" / ", " /\N{NO-BREAK SPACE}").replace("N m", "N\N{NO-BREAK SPACE}m")
+    return Markup(_TABLE.render(columns=columns, rows=rows) if rows else "")

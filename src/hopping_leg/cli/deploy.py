@@ -149,14 +149,9 @@ def _perform(
             " keep a hand on the switch.",
             yes=args.yes,
         )
-        header = hardware_trials.header_of(
-            robot, controller, CONTROL_RATE, transport=args.transport, drives=drives
-        )
+        facts = {"transport": args.transport, "drives": drives}
+        header = hardware_trials.header_of(robot, controller, CONTROL_RATE, **facts)
         return hardware_trials.perform(
-            link,
-            sequence,
-            limits,
-            hardware_trials.new_path(args.out, name),
-            header,
+            link, sequence, limits, hardware_trials.new_path(args.out, name), header,
             beside=lambda loop: keyboard.keys(height, loop.stop, options.say),
-        )
+        )  # fmt: skip

@@ -144,8 +144,10 @@ def _write(args: MovingBase | MultisineCommand) -> None:
         make = paper.moving_base
         if isinstance(args, FixedBase):
             make = partial(paper.fixed_base, swings=args.swings)
-        how = {"duration": args.duration, "margin": args.margin}
-        template = make(args.amplitudes, args.periods, bend=args.bend, **how)
+        template = make(
+            args.amplitudes, args.periods,
+            duration=args.duration, margin=args.margin, bend=args.bend,
+        )  # fmt: skip
         if args.adapt:
             template = paper.adapt(template, robot, rate=args.rate)
     excitation = make_excitation(
@@ -203,7 +205,7 @@ def _simulated(
             played = play(
                 excitation, robot, believed=believed, seed=args.seed + number, gains=gains,
                 timestep=args.timestep,
-                on_tick=lambda done, ticks, stem=stem: bar.show(stem, done / ticks),
+                on_tick=lambda done, ticks: bar.show(stem, done / ticks),  # noqa: B023
             )  # fmt: skip
             yield stem, played
 
@@ -240,17 +242,13 @@ def _measured(
                 motion_sequence.SequenceTiming(hop=seconds),
                 gains,
             )
-            header = hardware_trials.header_of(
-                robot, controller, rate, transport=transport, drives=drives
-            )
+            facts = {"transport": transport, "drives": drives}
+            header = hardware_trials.header_of(robot, controller, rate, **facts)
+            path = hardware_trials.new_path(args.out / "traces", name)
             done = hardware_trials.perform(
-                link,
-                sequence,
-                limits,
-                hardware_trials.new_path(args.out / "traces", name),
-                header,
+                link, sequence, limits, path, header,
                 beside=lambda loop: keyboard.keys(None, loop.stop, say),
-            )
+            )  # fmt: skip
             say(*done.notices)
             cause = done.outcome.supervisor.stop_cause
             if cause.reason is not stop_reasons.Reason.FINISHED or done.complaint:
@@ -258,7 +256,5 @@ def _measured(
                     f"{name} was stopped: {cause} {done.complaint} Its trace is {done.path}."
                 )
             file = f"{robot.name}-{name}.parquet"
-            yield (
-                name,
-                recording_of(done.trace, excitation, believed=believed, gains=gains, name=file),
-            )
+            filed = {"believed": believed, "name": file}
+            yield name, recording_of(done.trace, excitation, gains=gains, **filed)

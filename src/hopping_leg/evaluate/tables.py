@@ -30,7 +30,7 @@ _LOOKS: dict[str, tuple[str, float, str]] = {
     "_rad_s": ("rad/s", 1, ".1f"),
     "_minutes": ("min", 1, ".1f"),
     "_hz": ("Hz", 1, ".2f"),
-    "_nm": ("N m", 1, ".1f"),
+    "_nm": ("N\N{NO-BREAK SPACE}m", 1, ".1f"),
     "_m": ("mm", 1e3, ".1f"),
     "_w": ("W", 1, ".1f"),
     "_v": ("V", 1, ".1f"),

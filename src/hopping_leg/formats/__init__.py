@@ -1,14 +1,8 @@
 """ROS 2 bags and MCAP files: traces are written for other tools, what those record is read.
 
-Measured joints are ``sensor_msgs/JointState`` on ``/joint_states``, their commands the same on
-``/joint_commands``; every other number of a trace is a ``std_msgs/Float64`` on the topic of its
-column. Joints are named as in the leg's URDF; the rail's position is the base height. Times are
-those of the trace, from the start of the run; they are both the header's stamp and the time of the
-log.
-
-A bag, an MCAP file or rosbag2's folders and files in SQLite (.db3), becomes a table without ROS: a
-row is a message of one topic of ``sensor_msgs/JointState``; of all other topics it has the newest
-message that was logged by then. Columns are called after topic, joint and quantity, as in
+``docs/other-tools.md`` says which topic holds what. Times are those of the trace, from the start
+of the run, as header's stamp and as time of the log. Of a bag, an MCAP file or rosbag2's folders
+and files in SQLite (.db3), columns are called after topic, joint and quantity, as in
 ``joint_states/hip.position``, numbers of ``std_msgs/Float64`` after their topic.
 """
 

@@ -20,7 +20,6 @@ class MujocoSimulator(Simulator):
     Args:
         robot: The legs; without ``reality``.
         count: Number of legs n.
-        rate: Control rate, Hz.
         timestep: Physics step, s.
         threads: MuJoCo's threads, 0 for one per core.
         edit: Changes the model before it is compiled.
@@ -34,12 +33,11 @@ class MujocoSimulator(Simulator):
         robot: Robot,
         count: int,
         *,
-        rate: float = CONTROL_RATE,
         timestep: float = TIMESTEP,
         threads: int = 0,
         edit: Callable[[mujoco.MjSpec], None] | None = None,
     ) -> None:
-        super().__init__(robot, count, rate, timestep)
+        super().__init__(robot, count, CONTROL_RATE, timestep)
         if not robot.reality.neutral or robot.boom.radius:
             raise UsageError(
                 f"{robot.name} has a [reality] or a [boom], which MuJoCo does not simulate; take"
