@@ -81,12 +81,9 @@ def _watch(ended: Connection) -> None:
 class RayWorkers:
     """The CPUs of a Ray cluster; one that this process has joined already stays the one.
 
-    Args:
-        address: Address of the cluster; ``local`` or None starts one on this machine, which ends
-            with this process. As many tasks run at once as it has CPUs.
-
-    Raises:
-        UsageError: Ray is not installed or the cluster cannot be reached.
+    Its address is ``local`` or None for one that is started on this machine and ends with this
+    process. As many tasks run at once as it has CPUs. UsageError says that Ray is not installed or
+    the cluster cannot be reached.
     """
 
     def __init__(self, address: str | None = None) -> None:

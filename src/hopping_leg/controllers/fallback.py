@@ -19,14 +19,8 @@ class Fallback:
 
     It hands over, once and for good until ``reset``, where the policy raises an error, asks for a
     torque that is no number, or meets inputs far outside the range of its training
-    (``Policy.outside``). What the other controller raises ends the run.
-
-    Args:
-        policy: Controls the leg as long as it can.
-        other: Takes over.
-
-    Attributes:
-        report: Called with the reason of a hand-over, a sentence.
+    (``Policy.outside``). ``report`` is called with the reason, a sentence. What the other
+    controller raises ends the run.
     """
 
     def __init__(self, policy: Policy, other: Controller) -> None:

@@ -39,10 +39,8 @@ class JointGains:
 class JointPD:
     """Tracks one trajectory with all legs; a Controller. After its end, the last row is held.
 
-    Args:
-        position: Joint positions at each control period, rad, (ticks, 2).
-        velocity: Joint velocities there, rad/s, (ticks, 2); None sets them to zero, as the paper.
-        gains: Stiffness and damping.
+    Positions, rad, and velocities, rad/s, are those of each control period, (ticks, 2); velocities
+    are zero, as the paper's, unless given.
     """
 
     def __init__(

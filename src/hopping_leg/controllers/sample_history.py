@@ -72,12 +72,9 @@ class DatedObserver:
     """Fills a dated history with the samples as they arrive and filters it afresh each tick.
 
     Velocities carry little noise where they are small, positions carry much: positions are
-    integrated from velocities and pulled towards the measured ones by a constant gain. Between
-    known velocities the unknown ones are interpolated; after the last one they are held.
-
-    Args:
-        period: Control period, s.
-        gain: Pull per sample towards the measured position, 0 to 1, scalar or (n,).
+    integrated from velocities and pulled towards the measured ones by a constant gain, 0 to 1,
+    scalar or (n,), a sample. Between known velocities the unknown ones are interpolated; after the
+    last one they are held. The control period is in s.
     """
 
     def __init__(self, period: float, gain: float | Array) -> None:

@@ -96,15 +96,11 @@ class LineTransport:
 
 
 class Fdcanusb(LineTransport):
-    """An fdcanusb, or a drive's UART, behind a serial port.
+    """An fdcanusb, or a drive's UART, behind the serial port of a path.
 
-    Args:
-        path: Of the port.
-        checksums: None: all lines but those to a real fdcanusb have them, whose firmware may know
-            none until it asks for them.
-
-    Raises:
-        HardwareError: The port is in use or cannot be opened.
+    Without ``checksums`` given, all lines but those to a real fdcanusb have them, whose firmware
+    may know none until it asks for them. HardwareError says that the port is in use or cannot be
+    opened.
     """
 
     def __init__(self, path: str, checksums: bool | None = None) -> None:

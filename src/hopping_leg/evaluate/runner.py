@@ -42,17 +42,12 @@ class Entry:
 
 
 def load_entries(names: Sequence[str], robot: Robot, rate: float) -> list[Entry]:
-    """Load every controller that is named.
+    """Load every controller that is named, for the leg that it shall drive and a rate, Hz.
 
-    Args:
-        names: Shipped names, ``.onnx`` files, or patterns of such; ``LABEL=FILE`` gives a file
-            another name in all tables, and those of ``runs/*/policy.onnx`` go by their folders.
-        robot: The leg they shall drive.
-        rate: Control rate, Hz.
-
-    Raises:
-        PolicyError: A file is unreadable, does not fit, or a pattern matches nothing.
-        UsageError: There is no such controller.
+    Names are shipped ones, ``.onnx`` files, or patterns of such; ``LABEL=FILE`` gives a file
+    another name in all tables, and those of ``runs/*/policy.onnx`` go by their folders. PolicyError
+    says that a file is unreadable, does not fit, or that a pattern matches nothing, UsageError that
+    there is no such controller.
     """
     expanded = dict.fromkeys(pair for text in names for pair in _expand(text))
     return [_load(label, source, robot, rate) for label, source in expanded]

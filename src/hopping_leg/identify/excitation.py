@@ -89,16 +89,13 @@ def possible_demand(template: Template, robot: Robot, rate: float) -> tuple[Arra
     low, high = robot.of_joints("stop_lower"), robot.of_joints("stop_upper")
     fastest, possible = robot.of_joints("no_load_speed"), MotorLimit(robot).clip(torque, speed)
     outside, low_down = (q < low) | (q > high), clearance < LEAST_CLEARANCE
+    weak = "{:.1f} N m at {:.1f} rad/s exceeds the {:.1f} N m that the motor gives"
     for bad, reason, *values in (
         (np.isnan(q), "the foot is out of reach"),
         (outside, "{:.2f} rad is outside of the stops {:g} and {:g} rad", q, low, high),
         (low_down, "base or knee is {:.1f} mm above the ground, too low", 1e3 * clearance),
         (np.abs(speed) > fastest, "{:.1f} rad/s exceeds {:g} rad/s", speed, fastest),
-        (
-            np.abs(torque - possible) > 1e-9,
-            "{:.1f} N m at {:.1f} rad/s exceeds the {:.1f} N m that the motor gives",
-            *(torque, speed, possible),
-        ),
+        (np.abs(torque - possible) > 1e-9, weak, torque, speed, possible),
     ):
         if bad.any():
             tick, joint = np.argwhere(bad)[0].tolist()

@@ -36,8 +36,7 @@ def play(
     is filed under; the seed is of jitter and noise; ``on_tick`` gets ticks done and in all.
     PhysicsError says that the simulation became unstable, RecordingError that none can believe it.
     """
-    gains = gains or JointGains()
-    fixed = excitation.rig == "fixed-base"
+    gains, fixed = gains or JointGains(), excitation.rig == "fixed-base"
     legs = LegSimulator(
         robot, 1, rate=excitation.rate, timestep=timestep, threads=1, fixed_base=fixed
     )

@@ -154,11 +154,8 @@ def _read(path: Path, origin: str) -> tuple[pl.DataFrame, dict[str, Any], str]:
         raise RecordingError(f"{path} is a folder without .mcap or .db3 files, no bag.")
     digest = hashlib.sha256(content).hexdigest()
     if logs:
-        return (
-            pl.concat([_read_csv(f.read_bytes(), str(f)) for f in logs], how="horizontal"),
-            {},
-            digest,
-        )
+        tables = [_read_csv(file.read_bytes(), str(file)) for file in logs]
+        return pl.concat(tables, how="horizontal"), {}, digest
     if bag:
         return *read_bag(path, origin), digest
     if content.startswith(_PARQUET):

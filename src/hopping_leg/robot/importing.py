@@ -87,17 +87,11 @@ def _units() -> dict[str, str]:
 def imported_robot(
     leg: PlanarLeg, origin: str, motors: tuple[str, ...] = (), values: Mapping[str, float] = {}
 ) -> ImportedRobot:
-    """Return a robot file's tables for a leg.
+    """Return a robot file's tables for a leg that the file ``origin`` describes.
 
-    Args:
-        leg: What the file describes.
-        origin: The file, for sources and messages.
-        motors: One motor for both joints, or the hip's and the knee's, of ``MOTORS``.
-        values: Numbers that the user gives, by their path in a robot file, SI units.
-
-    Raises:
-        RobotError: Numbers are missing that cannot be assumed.
-        UsageError: There is no such motor.
+    Values are numbers that the user gives, by their path in a robot file, SI units; motors are one
+    of ``MOTORS`` for both joints, or the hip's and the knee's. RobotError says which numbers are
+    missing that cannot be assumed, UsageError that there is no such motor.
     """
     given = {path: (value, "given to `hop robots import`") for path, value in values.items()}
     entries = {**leg.numbers, **_motor_numbers(motors), **given}

@@ -53,15 +53,11 @@ def read_leg(
 ) -> PlanarLeg:
     """Return the leg that a URDF or MJCF file describes.
 
-    Args:
-        path: The file.
-        hip: Its name of the joint; by default found by structure and usual names.
-        knee: Likewise.
-        foot: The body, site or geom at the centre of the foot's sphere; by default found likewise.
+    Hip and knee are the file's names of joints, the foot that of the body, site or geom at the
+    centre of its sphere; by default they are found by structure and usual names.
 
-    Raises:
-        RobotError: The file cannot be read, a part is missing or ambiguous, or the leg moves in no
-            vertical plane.
+    RobotError says that the file cannot be read, that a part is missing or ambiguous, or that the
+    leg moves in no vertical plane.
     """
     tree = Description(path)
     data, body_of = tree.data, tree.model.jnt_bodyid

@@ -114,11 +114,8 @@ def check_physics(robot: Robot, origin: str) -> None:
     for path, low, high, why in _bounds(robot):
         value = attrgetter(path)(robot)
         if value is not None and not low <= value <= high:
-            lie = (
-                f"lie between {low:.5g} and {high:.5g}"
-                if high < math.inf
-                else f"be {low:.5g} or more"
-            )
+            within = f"lie between {low:.5g} and {high:.5g}"
+            lie = within if high < math.inf else f"be {low:.5g} or more"
             raise RobotError(f"{origin}: '{path}' is {value:g} but must {lie}: {why}.")
     for name, servo in zip(JOINTS, robot.hardware.servos, strict=True):
         if servo.id % 1 or abs(servo.sign) != 1:

@@ -63,20 +63,12 @@ _IMPOSSIBLE = 1e4  # Joint speed that no leg reaches, rad/s
 class LiveSimulation:
     """The simulation behind the page; knows nothing of it.
 
-    Controllers believe the robot to be as its file has it, whatever the settings.
+    One or two controllers, names or files, believe the robot, a name or file, to be as its file has
+    it, whatever the settings. ``valid`` are the heights, m, that all can be asked for; the one that
+    is commanded first is brought into them. The seed is of noise and random delay.
 
-    Args:
-        controllers: One or two names or files.
-        robot: Name or file.
-        height: Commanded first, m; brought into what the controllers can be asked for.
-        seed: Of noise and random delay.
-
-    Raises:
-        UsageError: There is no such controller, or they share no height.
-        RobotError: There is no such robot, or it cannot hop.
-
-    Attributes:
-        valid: Heights that every controller can be asked for, m.
+    UsageError says that there is no such controller, or that they share no height, RobotError that
+    there is no such robot, or that it cannot hop.
     """
 
     def __init__(

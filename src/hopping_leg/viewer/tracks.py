@@ -40,15 +40,10 @@ _ESTIMATE = "estimated_height_m"
 
 
 class Track:
-    """One leg's rows, in order of time.
+    """One leg's rows, in order of time; ``name`` is of who controls the leg.
 
-    Args:
-        name: Of who controls the leg.
-        robot: The leg.
-        depth: Rows that are kept; older ones are forgotten. 0 keeps all.
-
-    Attributes:
-        note: What the reader should know of where the rows come from.
+    Older rows than ``depth`` are forgotten; 0 keeps all. ``note`` is what the reader should know of
+    where the rows come from.
     """
 
     def __init__(self, name: str, robot: Robot, *, depth: int = 0) -> None:
@@ -135,14 +130,9 @@ class Track:
 class ReplaySource:
     """One or two traces side by side; both begin at zero.
 
-    Args:
-        paths: Of the traces.
-        robot: Name or file of the leg; none takes the one that each trace names.
-
-    Raises:
-        TraceError: A trace cannot be read or holds no tick.
-        RobotError: A trace's robot is no shipped one and ``robot`` was not given.
-        UsageError: There are too many traces.
+    The robot, a name or file, is the one that each trace names unless it is given. UsageError says
+    that there are too many traces, TraceError that one cannot be read or holds no tick, RobotError
+    that its robot is no shipped one and none was given.
     """
 
     def __init__(self, paths: tuple[Path, ...], robot: str | None = None) -> None:
@@ -202,12 +192,8 @@ _LOOK = 0.5  # Seconds between looks for a newer run
 class RecorderSource:
     """Shows the newest run; the robot that runs it learns nothing of it.
 
-    Args:
-        path: Of a black box, or of the folder in which `hop deploy` writes them.
-        robot: Name or file of the leg; none takes the one that the run names.
-
-    Raises:
-        UsageError: There is neither such a file nor such a folder.
+    The path is of a black box, or of the folder in which `hop deploy` writes them, else UsageError;
+    the robot, a name or file, is the one that the run names unless it is given.
     """
 
     def __init__(self, path: Path, robot: str | None = None) -> None:

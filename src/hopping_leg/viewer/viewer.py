@@ -39,14 +39,9 @@ Source = live_leg.LiveSimulation | tracks.ReplaySource | tracks.RecorderSource
 
 
 class Viewer:
-    """Serves the page from when it is made; nothing moves before ``run``.
+    """Serves the page of a source from when it is made; nothing moves before ``run``.
 
-    Args:
-        source: What is shown.
-        port: Port to listen at; if it is in use, the next free one.
-
-    Raises:
-        UsageError: There is no such port.
+    Where the port is in use, it is the next free one; UsageError says that there is no such port.
     """
 
     def __init__(self, source: Source, *, port: int = 8080) -> None:
