@@ -1,14 +1,8 @@
 import numpy as np
 import pytest
 
-from hopping_leg.hop_detection import (
-    FLIGHT_CLEARANCE,
-    USUAL_PERIOD,
-    count_skipped,
-    find_bounces,
-    find_hops,
-    measure_hops,
-)
+from hopping_leg import hop_detection
+from hopping_leg.hop_detection import count_skipped, find_bounces, find_hops
 
 RATE = 200.0
 GRAVITY = 9.81
@@ -38,7 +32,7 @@ def test_every_apex_is_found_within_a_tenth_of_a_millimetre():
 
 def test_a_maximum_with_the_foot_on_the_ground_is_no_apex_but_a_bounce_unless_it_is_a_ripple():
     height, rate, gap = hopping([0.3] * 6)
-    grounded = np.minimum(gap, FLIGHT_CLEARANCE / 2)
+    grounded = np.minimum(gap, hop_detection.FLIGHT_CLEARANCE / 2)
     assert len(find_hops(height, rate, grounded).apex) == 0
     assert len(find_bounces(height, grounded)) == 6
     assert len(find_bounces(height, gap)) == 0
@@ -54,7 +48,7 @@ def test_several_apexes_of_one_flight_are_one_hop_as_high_as_the_highest():
     again = find_hops(height, rate, gap)
     np.testing.assert_array_equal(again.tick, once.tick)
     np.testing.assert_array_equal(again.apex, once.apex)
-    measured = measure_hops(height, rate, gap, RATE)
+    measured = hop_detection.measure_hops(height, rate, gap, RATE)
     assert (len(measured.apex), measured.skipped) == (20, 0)
 
 
@@ -78,4 +72,4 @@ def test_a_bounce_in_a_long_gap_is_one_skipped_hop():
 
 def test_a_leg_that_never_hops_skips_at_the_usual_period():
     none = np.empty(0, dtype=int)
-    assert count_skipped(none, none, 0, 2000, RATE) == 2000 / RATE / USUAL_PERIOD
+    assert count_skipped(none, none, 0, 2000, RATE) == 2000 / RATE / hop_detection.USUAL_PERIOD

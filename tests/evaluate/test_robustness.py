@@ -9,17 +9,9 @@ import pytest
 
 from hopping_leg.controllers import rollout
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import Entry
+from hopping_leg.evaluate import Entry, robustness
 from hopping_leg.evaluate.figures import draw_robustness
-from hopping_leg.evaluate.robustness import (
-    PUSH_SECONDS,
-    Suite,
-    level_rows,
-    make_trials,
-    outcome,
-    run_suite,
-    score_rows,
-)
+from hopping_leg.evaluate.robustness import Suite, make_trials, outcome, run_suite
 from hopping_leg.evaluate.robustness_axes import AXES, JOINT, Case, axes_named
 from hopping_leg.figures import encode
 from hopping_leg.sim import LegSimulator
@@ -81,7 +73,7 @@ def test_levels_differ_in_size_only(plan):
     force = plan("pushes", [0.1, 0.3]).perturbation.force
     small, large = force[:, :4], force[:, 4:]
     np.testing.assert_allclose(large, 3 * small)
-    assert (np.count_nonzero(small, axis=0) == 9 * round(PUSH_SECONDS * 200)).all()
+    assert (np.count_nonzero(small, axis=0) == 9 * round(robustness.PUSH_SECONDS * 200)).all()
     assert np.abs(small).sum(axis=0) / 200 == pytest.approx(np.full(4, 0.9))
 
 
@@ -147,7 +139,7 @@ def rows(level, *successes, repeats=None, **more):
 
 
 def score(outcomes, seed=0):
-    *own, found = score_rows("mine", outcomes, seed)
+    *own, found = robustness.score_rows("mine", outcomes, seed)
     assert [row["axis"] for row in own] == list(outcomes)
     assert found["trials"] == sum(row["trials"] for row in own)
     return found["score"], found["low"], found["high"]
@@ -177,7 +169,7 @@ def test_the_interval_is_over_realisations_not_over_trials():
 def test_rows_tell_levels():
     good = pl.concat([rows(0.1, True), rows(0.1, True, error_m=0.01)])
     bad = [rows(0.2, False, error_m=-0.05, contacts=3), rows(0.2, False, error_m=-0.09, skipped=4)]
-    levels = level_rows("mine", "delay", pl.concat([*bad, good]))
+    levels = robustness.level_rows("mine", "delay", pl.concat([*bad, good]))
     assert [row["level"] for row in levels] == [0.1, 0.2]
     assert [row["success"] for row in levels] == [1.0, 0.0]
     assert levels[1]["median_abs_error_m"] == pytest.approx(0.07)

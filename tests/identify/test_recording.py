@@ -9,15 +9,8 @@ import pytest
 from hopping_leg.errors import RecordingError
 from hopping_leg.identify.importers import log_format
 from hopping_leg.identify.recording import load_recording, make_recording
-from tests.identify.runs import (
-    METADATA,
-    RECORDINGS,
-    SIDECAR,
-    needs_recordings,
-    rig_log,
-    swinging,
-    write_run,
-)
+from tests.identify import runs
+from tests.identify.runs import METADATA, SIDECAR, needs_recordings, swinging, write_run
 
 POSITIONS = ["hip_position_rad", "knee_position_rad"]
 VELOCITIES = ["hip_velocity_rad_s", "knee_velocity_rad_s"]
@@ -87,7 +80,7 @@ def test_what_is_no_table_is_refused(tmp_path, content, named):
 def test_a_rigs_own_log_is_known_by_either_name_of_its_clock(tmp_path, clock):
     path, other = tmp_path / "log.csv", tmp_path / "designC0_run.csv"
     for file in (path, other):
-        rig_log(clock).write_csv(file)
+        runs.rig_log(clock).write_csv(file)
     assert load_recording(path).metadata.robot == "doublependulum"
     with pytest.raises(RecordingError, match=r"design C\.0.*another robot.*sidecar"):
         load_recording(other)
@@ -134,7 +127,7 @@ def test_segments_end_where_rows_are_missing():
     assert any("stall of 20.0 ms" in warning for warning in recording.warnings)
 
 
-FILES = sorted(RECORDINGS.glob("*/*.csv.gz"))
+FILES = sorted(runs.RECORDINGS.glob("*/*.csv.gz"))
 
 
 @needs_recordings
@@ -154,7 +147,7 @@ def test_real_recordings_are_believed(path):
 
 @needs_recordings
 def test_interpolated_samples_never_count_as_measured():
-    path = next((RECORDINGS / "legv2_fixed_base").glob("*seg0*"))
+    path = next((runs.RECORDINGS / "legv2_fixed_base").glob("*seg0*"))
     recording = load_recording(path)
     shares = [np.isfinite(recording.array(q)).mean() for q in ("position", "velocity", "torque")]
     np.testing.assert_allclose(shares, [0.11, 0.18, 0.40], atol=0.06)

@@ -6,18 +6,10 @@ import pytest
 from hypothesis import given, settings
 
 from hopping_leg.errors import RobotError
-from hopping_leg.robot import (
-    JOINTS,
-    dynamics,
-    get_spec,
-    kinematics,
-    load_robot,
-    shipped_robots,
-    to_urdf,
-)
+from hopping_leg.robot import JOINTS, dynamics, get_spec, kinematics, load_robot, to_urdf
 from hopping_leg.robot.importing import imported_robot, read_values
 from hopping_leg.robot.planar_leg import read_leg
-from hopping_leg.robot.robot_files import robot_from_tree
+from hopping_leg.robot.robot_files import robot_from_tree, shipped_robots
 from tests.doc_pages import ROOT
 from tests.robot.legs import SEEDS, random_robot, random_state
 

@@ -7,14 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg.deploy.safety_limits import hopping_limits
-from hopping_leg.robot import (
-    OVERSPEED,
-    MotorLimit,
-    braking_times,
-    get_spec,
-    load_robot,
-    shipped_robots,
-)
+from hopping_leg.robot import MotorLimit, get_spec, limits, load_robot, shipped_robots
 
 
 @pytest.mark.parametrize("side", [-1, 1])
@@ -67,7 +60,7 @@ def test_a_motors_gain_acts_on_what_its_limits_let_through(torque, qd):
     np.testing.assert_array_equal(weak.give(torque, qd), within * [1.0, 0.9])
 
 
-@pytest.mark.parametrize("share", [0.1, 0.5, OVERSPEED])
+@pytest.mark.parametrize("share", [0.1, 0.5, limits.OVERSPEED])
 @pytest.mark.parametrize("joint", [0, 1])
 @pytest.mark.parametrize("name", ["legv1", "legv2", "legv2-paper"])
 def test_shorted_windings_brake_a_joint_before_its_stop(name, joint, share):
@@ -77,7 +70,7 @@ def test_shorted_windings_brake_a_joint_before_its_stop(name, joint, share):
     data = mujoco.MjData(model)
     speed, stop = (robot.of_joints(x)[joint] for x in ("no_load_speed", "stop_upper"))
     speed *= share
-    data.qpos[joint] = stop - speed * braking_times(robot, rate)[joint]
+    data.qpos[joint] = stop - speed * limits.braking_times(robot, rate)[joint]
     data.qvel[joint] = speed
     motor = (robot.hip, robot.knee)[joint]
     slope = motor.motor.peak_torque * motor.belt_ratio / motor.no_load_speed

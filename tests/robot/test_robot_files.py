@@ -14,16 +14,7 @@ from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.deploy.drive_link import joint_transforms
 from hopping_leg.envs import HoppingEnv
 from hopping_leg.errors import RobotError
-from hopping_leg.robot import (
-    JOINTS,
-    NO_MISMATCH,
-    build_model,
-    load_robot,
-    robot_from_tree,
-    robot_text,
-    robot_tree,
-    shipped_robots,
-)
+from hopping_leg.robot import JOINTS, NO_MISMATCH, build_model, load_robot, robot_files
 from hopping_leg.robot.hardware import HeightSensor
 from tests.robot.files import UNITS, whole, written
 
@@ -68,7 +59,7 @@ def test_a_pendulum_swings_freely_but_cannot_hop():
 
 
 def test_a_leg_that_states_no_stops_has_leg_v2s_and_a_pendulum_none_within_a_turn():
-    for robot in map(load_robot, shipped_robots()):
+    for robot in map(load_robot, robot_files.shipped_robots()):
         free = {"stop_lower": math.nan, "stop_upper": math.nan}
         joints = {name: dataclasses.replace(getattr(robot, name), **free) for name in JOINTS}
         bare = dataclasses.replace(robot, **joints)
@@ -200,8 +191,8 @@ def test_a_limit_may_be_what_the_hardware_holds(tmp_path):
     load_robot(written(tmp_path / "leg.toml", numbers, "legv2"))
 
 
-@pytest.mark.parametrize("name", shipped_robots())
+@pytest.mark.parametrize("name", robot_files.shipped_robots())
 def test_a_robot_comes_back_from_the_tables_that_are_made_of_it(name):
     robot = load_robot(name)
-    tables = tomllib.loads(robot_text(robot_tree(robot, "a test")))
-    assert robot_from_tree(tables, "its file") == robot
+    tables = tomllib.loads(robot_files.robot_text(robot_files.robot_tree(robot, "a test")))
+    assert robot_files.robot_from_tree(tables, "its file") == robot
