@@ -98,25 +98,6 @@ def test_a_height_sensor_that_is_silent_is_named_before_the_leg_moves(emulate, t
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("answer", "says"), [("[[0.0, 0.0]]", None), ("[[float('nan'), 0.0]]", "mine.py:Mine")]
-)
-def test_a_python_class_is_deployed_and_stopped_by_name(emulate, tmp_path, capsys, answer, says):
-    emulate()
-    file = tmp_path / "mine.py"
-    file.write_text(
-        "class Mine:\n    def __init__(self, robot, rate): pass\n    def reset(self, count): pass\n"
-        f"    def act(self, measurement): return {answer}\n"
-    )
-    words = [RUN[0], f"{file}:Mine", *RUN[2:], "--robot", "legv2-paper", "--yes"]
-    words += ["--out", str(tmp_path / "run")]
-    assert main(words) == (2 if says else 0)
-    assert says is None or says in capsys.readouterr().err
-    (trace,) = (tmp_path / "run").glob("*.parquet")
-    assert Trace.load(trace).header["controller"] == "Mine"
-
-
-@pytest.mark.slow
 def test_a_fault_is_a_sentence_and_an_exit_code(emulate, tmp_path, refused):
     emulate(faults=(Fault("drive_fault", at=0.6, drive="hip", value=33),))
     refused([*RUN, "--yes", "--out", tmp_path], "hip: fault 33 (motor driver)")
@@ -130,10 +111,14 @@ def test_doctor_says_what_is_wrong_and_puts_it_right(emulate, capsys):
     out = capsys.readouterr().out
     assert "servo.timeout_mode is 12 but must be 15" in out
     assert "not homed" in out
-    lockstep = emulate(configured=False, homed=False)
-    angles = [f"{angle:.3f}" for angle in lockstep.robot.leg.q]
+    robot = emulate(configured=False, homed=False).robot
+    angles = [f"{angle:.3f}" for angle in robot.leg.q]
     assert main([*words, "--write", "--home", *angles]) == 0
     assert "may be armed" in capsys.readouterr().out
+    for drive, wire, q in zip(robot.drives, robot.leg.transforms, robot.leg.q, strict=True):
+        drive.settings.load()
+        assert drive.settings["servo.timeout_mode"] == 15, "written for good"
+        assert drive.encoder.position == pytest.approx(wire.motor_position(q), abs=1e-3)
 
 
 def check_recording(recording, played):

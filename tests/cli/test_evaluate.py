@@ -54,12 +54,6 @@ def test_soft_limits_may_be_left_out(on):
     assert (setup_conditions(setup)["soft_limits"] is not None) == on
 
 
-@pytest.mark.parametrize(("given", "robot"), [(None, "legv2-paper"), ("legv2", "legv2")])
-def test_the_leg_is_that_of_the_first_policy_unless_another_is_named(given, robot):
-    _, setup = load(Evaluate(("energy-shaping", "paper"), robot=given))
-    assert setup.robot.name == robot
-
-
 def test_a_policy_is_judged_on_the_robot_that_lies_beside_it(tmp_path, monkeypatch, capsys):
     onnx_export = pytest.importorskip("hopping_leg.rl.onnx_export")
     from hopping_leg.rl.run_folder import write_robot

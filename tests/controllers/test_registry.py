@@ -5,12 +5,10 @@ import dataclasses
 import pytest
 
 from hopping_leg.controllers.registry import (
-    load_controller,
     load_policy,
     robot_of,
     shipped_policies,
 )
-from hopping_leg.errors import UsageError
 from hopping_leg.rl.onnx_export import with_card
 from hopping_leg.robot import DEFAULT_ROBOT, load_robot, shipped_robots
 
@@ -41,10 +39,3 @@ def test_the_first_policy_decides(tmp_path):
 def test_who_was_not_trained_hops_on_the_default_robot():
     for controllers in ([], ["energy-shaping"], ["universal"], ["missing.onnx", "my.toml"]):
         assert robot_of(controllers) == DEFAULT_ROBOT
-
-
-def test_a_robot_file_is_no_controller(tmp_path):
-    file = tmp_path / "mine.toml"
-    file.write_text('name = "mine"\nextends = "legv2"\n')
-    with pytest.raises(UsageError, match="is a robot file, no controller"):
-        load_controller(file, load_robot("legv2"))

@@ -13,11 +13,11 @@ from numba.core import event
 
 from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.deploy.drive_info import configure, home, inspect
+from hopping_leg.deploy.drive_info import home, inspect
 from hopping_leg.deploy.drive_link import BRAKE
 from hopping_leg.deploy.hardware_trials import header_of, perform
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
-from hopping_leg.deploy.preflight import check_drives, require_fit, required_settings
+from hopping_leg.deploy.preflight import check_drives, require_fit
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
@@ -92,43 +92,6 @@ def test_healthy_drives_pass_every_check_also_where_answers_are_lost(emulated, l
     assert facts[0].serial != facts[1].serial
     assert len(lockstep.robot.fault_injector.log) == lost
     np.testing.assert_allclose([f.position for f in facts], lockstep.robot.leg.q, atol=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("start", "words"),
-    [
-        ({"faults": (Fault("boot_pose", drive="knee"),)}, "knee is not homed"),
-        (
-            {"faults": (Fault("configuration", name="servo.max_current_A", value=20.0),)},
-            "servo.max_current_A is 20 but must be 100",
-        ),
-        ({"faults": (Fault("silence", since="start", drive="knee"),)}, "knee's drive (id 2) does"),
-    ],
-)
-def test_a_drive_that_is_not_fit_is_refused_with_the_reason(emulated, start, words):
-    lockstep = emulated(**start)
-    lockstep.robot.advance(0.01)
-    findings = check_drives(LEG, LIMITS, inspect(lockstep.link))
-    complaints = [finding.complaint for finding in findings]
-    assert any(words in complaint for complaint in complaints), complaints
-    with pytest.raises(HardwareError, match="Not armed"):
-        require_fit(findings)
-
-
-def test_configuring_and_homing_make_a_delivered_drive_fit(emulated):
-    lockstep = emulated(configured=False, homed=False)
-    findings = check_drives(LEG, LIMITS, inspect(lockstep.link))
-    for joint in (0, 1):
-        wrong = {f.setting for f in findings if f.joint == joint and f.setting}
-        assert "servo.timeout_mode" in wrong
-        settings = [s for s in required_settings(LEG, joint) if s.name in wrong]
-        configure(lockstep.link, joint, settings)
-    home(lockstep.link, lockstep.robot.leg.q + np.array([0.1, -0.1]))
-    facts = inspect(lockstep.link)
-    require_fit(check_drives(LEG, LIMITS, facts))
-    np.testing.assert_allclose([f.position for f in facts], lockstep.robot.leg.q, atol=1e-3)
-    lockstep.robot.drives[0].settings.load()
-    assert lockstep.robot.drives[0].settings["servo.timeout_mode"] == 15
 
 
 def test_nothing_is_compiled_or_loaded_in_a_control_loop(emulated, tmp_path):

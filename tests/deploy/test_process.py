@@ -115,29 +115,3 @@ def test_a_second_signal_ends_the_process_within_a_second(emulator, tmp_path, co
     time.sleep(0.3)
     assert DriveMode.POSITION not in emulator.state().modes
     assert recover(box).table.height > BEGUN
-
-
-HOST = """
-import sys, time
-from hopping_leg.deploy.moteus_link import MoteusLink
-from hopping_leg.deploy.transport import open_transport
-from hopping_leg.robot import load_robot
-link = MoteusLink(load_robot("legv2-paper"), open_transport(sys.argv[1]))
-print("open", flush=True)
-time.sleep(600)
-"""
-
-
-def test_a_second_host_is_refused_with_the_name_of_the_first(emulator):
-    path = emulator.path
-    words = ["doctor", "--transport", str(path), "--robot", "legv2-paper"]
-    code = [sys.executable, "-c", HOST, str(path)]
-    with subprocess.Popen(code, stdout=subprocess.PIPE, text=True) as first:
-        assert first.stdout.readline() == "open\n"
-        second = subprocess.run(
-            [sys.executable, "-m", "hopping_leg.cli", *words], capture_output=True, text=True
-        )
-        first.kill()
-    assert second.returncode == 2
-    assert f"{path} is in use by process {first.pid} (" in second.stderr
-    assert second.stderr.count("\n") == 1

@@ -81,4 +81,6 @@ def test_an_adapter_that_asks_for_checksums_gets_them(terminal):
         port.receive(time.monotonic() + WAIT)
     assert [isinstance(item, Frame) for item in heard] == [False, False, True, False, True]
     assert port.trouble == "ERR checksum missing"
+    with pytest.raises(HardwareError, match="in use by another process, or this one"):
+        Fdcanusb(os.ttyname(slave))
     port.close()

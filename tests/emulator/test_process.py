@@ -88,11 +88,6 @@ def test_a_plug_comes_back_under_the_same_name(tmp_path):
     assert not link.is_symlink()
 
 
-def test_the_parent_is_told_of_a_wrong_start():
-    with pytest.raises(UsageError, match="There is no pose 'handstand'"):
-        EmulatorProcess(EmulatorConfig(pose="handstand"))
-
-
 def lockstep(checksums=True, **start):
     return Lockstep(EmulatorConfig(**start).build(), checksums=checksums)
 
