@@ -11,7 +11,6 @@ from hopping_leg.io import replace_at
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import LegSimulator, leg_simulator
 from hopping_leg.sim.any_leg import draw_leg
-from hopping_leg.sim.mujoco_simulator import MujocoSimulator
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, draw_twin, sample
 from tests.controllers.measurements import hops_of
 
@@ -89,4 +88,4 @@ def test_it_is_for_simulated_legs_of_the_stepper_alone():
     with pytest.raises(UsageError, match="true state"):
         load_controller("mpc-true-state", ROBOT)
     with pytest.raises(UsageError, match="stepper"):
-        hop(ROBOT, np.array([0.3]), MujocoSimulator(ROBOT, 1, timestep=STEP))
+        load_controller("mpc-true-state", ROBOT, simulated=True).watch(object())

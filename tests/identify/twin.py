@@ -11,7 +11,7 @@ from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.play_excitation import play
 from hopping_leg.identify.recording import make_recording
 from hopping_leg.identify.recording_format import PAIRS, RecordingMetadata
-from hopping_leg.robot import MotorLimit, compile_spec, get_spec, kinematics, load_robot
+from hopping_leg.robot import MotorLimit, get_spec, kinematics, load_robot
 
 STEP = 1e-3
 """Physics step of the fits."""
@@ -40,7 +40,7 @@ def rig_model(robot, rig, timestep=FINE):
     for actuator in spec.actuators:
         actuator.ctrllimited = False
         actuator.gear[0] = 1
-    return compile_spec(spec, robot.name)
+    return spec.compile()
 
 
 def record(robot, targets, rig="fixed-base", rate=200.0, onboard="zoh", name="twin"):

@@ -12,7 +12,7 @@ from hopping_leg.controllers.protocol import Controller
 from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.robot import TIMESTEP, Robot, SoftLimits, kinematics
-from hopping_leg.sim import CONTROL_RATE, LOADS, LegSimulator, NoiseAndDelay, Plant, Simulator
+from hopping_leg.sim import CONTROL_RATE, LOADS, LegSimulator, NoiseAndDelay, Plant
 from hopping_leg.trace import COLUMNS, Trace
 
 _START_SHARE = 0.2 / 0.29  # leg length of the standing start as a share of the straight leg's
@@ -87,7 +87,7 @@ class PrivilegedController(Protocol):
     It is for studies, never for a robot.
     """
 
-    def watch(self, legs: Simulator) -> None:
+    def watch(self, legs: LegSimulator) -> None:
         """Take the legs, live; called before their first tick."""
         ...
 
@@ -116,7 +116,7 @@ def rollout(
     seed: int,
     on_tick: Callable[[int, int], None] | None = None,
     perturbation: Perturbation | None = None,
-    legs: Simulator | None = None,
+    legs: LegSimulator | None = None,
 ) -> Rollout:
     """Let a controller hop from a standing start; a ``PrivilegedController`` is shown the legs.
 
@@ -151,7 +151,7 @@ def rollout(
     data = np.empty((len(_COLUMNS), ticks, count))
     internals, ground = dict[str, Array](), np.zeros(count)
     for tick in range(ticks):
-        if perturbation is not None and isinstance(legs, LegSimulator):
+        if perturbation is not None:
             ground = perturbation.act(legs, ground, tick)
         row = data[:, tick]
         row[0], row[1], row[2:4], row[4:6] = legs.height, legs.height_rate, legs.q.T, legs.qd.T

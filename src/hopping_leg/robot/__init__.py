@@ -12,7 +12,6 @@ from hopping_leg.robot.model import CONTROL_RATE as CONTROL_RATE
 from hopping_leg.robot.model import GRAVITY as GRAVITY
 from hopping_leg.robot.model import TIMESTEP as TIMESTEP
 from hopping_leg.robot.model import build_model as build_model
-from hopping_leg.robot.model import compile_spec as compile_spec
 from hopping_leg.robot.model import get_spec as get_spec
 from hopping_leg.robot.model import to_urdf as to_urdf
 from hopping_leg.robot.model_mismatch import NO_MISMATCH as NO_MISMATCH

@@ -78,16 +78,11 @@ def build_model(robot: Robot, timestep: float = TIMESTEP) -> mujoco.MjModel:
 
     RobotError says that MuJoCo refuses the parameters, e.g. a mass that is too small.
     """
-    return compile_spec(get_spec(robot, timestep), robot.name)
-
-
-def compile_spec(spec: mujoco.MjSpec, name: str) -> mujoco.MjModel:
-    """Compile an edited model of the robot ``name``; RobotError as in ``build_model``."""
     try:
-        return spec.compile()
+        return get_spec(robot, timestep).compile()
     except ValueError as error:
         reason = " ".join(str(error).split()).removeprefix("Error: ")
-        raise RobotError(f"MuJoCo cannot build robot '{name}': {reason}.") from error
+        raise RobotError(f"MuJoCo cannot build robot '{robot.name}': {reason}.") from error
 
 
 def _set_link(spec: mujoco.MjSpec, name: str, link: Link, joint: Joint) -> None:

@@ -11,20 +11,21 @@ import numpy as np
 
 from hopping_leg.arrays import Array, IntArray, Records
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import TIMESTEP, Robot
+from hopping_leg.robot import CONTROL_RATE, TIMESTEP, Robot, kinematics
 from hopping_leg.sim import stepper
 from hopping_leg.sim.compiled import announce
 from hopping_leg.sim.leg_table import LEG, leg_geometry, leg_table
-from hopping_leg.sim.simulator import CONTROL_RATE, Simulator
 
 _STEPS_PER_THREAD = 4000  # Physics steps for which it is worth waking another thread
 
 
-class LegSimulator(Simulator):
+class LegSimulator:
     """Legs in the compiled stepper; results do not depend on the number of threads.
 
     The robots' ``reality`` holds. What the encoders report is the true state of the motors' side
-    unless a robot has noise, quantisation or latency of measurements.
+    unless a robot has noise, quantisation or latency of measurements. ``state`` (n, 6) is a live
+    view of the true state (x, q1, q2 and their rates), and so are its parts ``height``,
+    ``height_rate`` (n,), ``q`` and ``qd`` (n, 2), in m, m/s, rad and rad/s.
 
     Args:
         robot: What controllers believe.
@@ -51,14 +52,18 @@ class LegSimulator(Simulator):
         fixed_base: bool = False,
         robots: Sequence[Robot] = (),
     ) -> None:
-        super().__init__(robot, count, rate, timestep)
+        self.substeps = _substeps(rate, timestep)
+        self.robot, self.count, self.rate, self.timestep = robot, count, rate, timestep
+        self.period = 1 / rate
         if robots and len(robots) != count:
             raise UsageError(f"{len(robots)} robots were given for {count} legs; give one each.")
         self.threads, self.fixed_base = threads or os.cpu_count() or 1, fixed_base
         parts = min(self.threads, max(count, 1), 1 + count * self.substeps // _STEPS_PER_THREAD)
         ends = np.linspace(0, count, parts + 1).astype(int).tolist()
         self._parts = list(itertools.pairwise(ends))
-        self._show(np.zeros((count, 6)))
+        self.state: Array = np.zeros((count, 6))
+        self.height, self.height_rate = self.state[:, 0], self.state[:, 3]
+        self.q, self.qd = self.state[:, 1:3], self.state[:, 4:6]
         self.records: Records = np.zeros(count, stepper.MEMORY)
         """What each leg remembers besides its state, live, (n,) of ``MEMORY``."""
         self._push = np.zeros(count)
@@ -93,6 +98,7 @@ class LegSimulator(Simulator):
         """What each leg is."""
         self.table = table
         self.geometry = leg_geometry(robots)
+        """Lengths of the legs."""
         self._jitters = bool(table["command_jitter"].any())
         self._noisy = bool(table["sensor_noise"].any())
         late = bool(table["measurement_latency"].any())
@@ -149,6 +155,13 @@ class LegSimulator(Simulator):
         self.height[ids], self.q[ids] = height, q
         self.forget(ids)
 
+    def stand(self, ids: IntArray | slice, q: Array, clearance: Array | float = 0.0) -> None:
+        """Put legs at rest in a posture with the foot ``clearance`` above the ground, m, (k,).
+
+        A foot on the ground touches it by a nanometre, so that no rounding decides.
+        """
+        self.place(ids, kinematics.stance_height(self.robot, q) + clearance - 1e-9, q)
+
     def forget(self, ids: IntArray | slice) -> None:
         """Let legs begin anew in their state: no command under way, clean readings."""
         rows = np.arange(self.count)[ids]
@@ -182,6 +195,18 @@ class LegSimulator(Simulator):
                 self.table, self.records, self._past, draws, self._reading, self.timestep
             )
 
+    def foot_clearance(self) -> Array:
+        """Return the gap between each foot and the ground, m, (n,)."""
+        return kinematics.foot_clearance(self.geometry, self.height, self.q)
+
+    def knee_clearance(self) -> Array:
+        """Return the gap between each knee and the ground, m, (n,)."""
+        return kinematics.knee_clearance(self.geometry, self.height, self.q)
+
+    def base_clearance(self) -> Array:
+        """Return the gap between each base and the ground, m, (n,)."""
+        return kinematics.base_clearance(self.geometry, self.height)
+
     def in_parallel(self, work: Callable[[int, int], None]) -> None:
         """Do something for the legs from a first to before a last one, on as many threads."""
         first, *others = self._parts
@@ -209,6 +234,19 @@ class LegSimulator(Simulator):
         self.records.view(np.float64).reshape(self.count, -1)[:] = memory["memory"]
         self._past = np.array(memory["past"], np.float64, order="C")
         self.rng.bit_generator.state = memory["rng"]
+
+
+def _substeps(rate: float, timestep: float) -> int:
+    for name, value in (("control rate", rate), ("physics step", timestep)):
+        if not 0 < value < np.inf:
+            raise UsageError(f"The {name} is {value} but must be positive and finite.")
+    substeps = round(1 / (rate * timestep))
+    if substeps < 1 or abs(substeps * timestep * rate - 1) > 1e-9:
+        raise UsageError(
+            f"A physics step of {timestep} s does not divide the control period of"
+            f" {1 / rate} s; take e.g. {1 / (rate * max(substeps, 1)):g} s."
+        )
+    return substeps
 
 
 @cache

@@ -6,7 +6,7 @@ from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.robot import Robot, SoftLimits
 from hopping_leg.sim.channel import Channel, Measurement, NoiseAndDelay
 from hopping_leg.sim.compiled import compiled
-from hopping_leg.sim.simulator import Simulator
+from hopping_leg.sim.leg_simulator import LegSimulator
 
 
 class SoftLimiter:
@@ -57,7 +57,7 @@ class Plant:
 
     def __init__(
         self,
-        legs: Simulator,
+        legs: LegSimulator,
         disturbance: NoiseAndDelay,
         soft_limits: SoftLimits | None,
         rng: np.random.Generator,
