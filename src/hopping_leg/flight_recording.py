@@ -125,25 +125,14 @@ class FlightRecorderTail:
         self._file.close()
 
 
-def read_recording(path: Path) -> tuple[FlightRecorderTail, Array]:
-    """Return a flight recording and its rows, (ticks, columns), also of a process that was killed.
-
-    TraceError says that the file is missing, or no flight recording.
-    """
-    with contextlib.closing(FlightRecorderTail(path)) as box:
-        rows = box.rows()
-    if not box.columns:
-        raise errors.TraceError(f"{path} ends before its header; the run had not begun.")
-    return box, rows
-
-
 def recover(path: Path) -> trace.Trace:
-    """Return the common trace of a run from its flight recording.
+    """Return the common trace of a run from its flight recording, also if it was killed.
 
     Columns that a trace may rely on and the recording lacks hold NaN. TraceError says that the
     file is missing, no flight recording, or holds no tick.
     """
-    box, rows = read_recording(path)
+    with contextlib.closing(FlightRecorderTail(path)) as box:
+        rows = box.rows()
     if not len(rows):
         raise errors.TraceError(f"{path} holds no tick; the run had not begun.")
     missing = [name for name in trace.COLUMNS if name not in box.columns]

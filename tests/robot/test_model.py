@@ -1,5 +1,3 @@
-import dataclasses
-
 import mujoco
 import numpy as np
 import pytest
@@ -49,15 +47,6 @@ def test_the_supervisor_knows_the_motors_by_the_same_line(torque, qd):
     lines = hopping_limits(ROBOT, 200.0).motors
     shares = [m.share(*seen) for m, seen in zip(lines, zip(torque, qd, strict=True), strict=True)]
     np.testing.assert_allclose(shares * MOTORS.limit, MOTORS.clip(torque, qd), atol=1e-9)
-
-
-@given(pairs, pairs)
-def test_a_motors_gain_acts_on_what_its_limits_let_through(torque, qd):
-    knee = dataclasses.replace(ROBOT.knee, torque_gain=0.9)
-    weak = MotorLimit(dataclasses.replace(ROBOT, knee=knee))
-    within = MOTORS.clip(torque, qd)
-    np.testing.assert_array_equal(MOTORS.give(torque, qd), within)
-    np.testing.assert_array_equal(weak.give(torque, qd), within * [1.0, 0.9])
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, limits.OVERSPEED])

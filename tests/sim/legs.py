@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 
 from hopping_leg.io import replace_at
-from hopping_leg.robot import DriveMismatch, load_robot
-from hopping_leg.robot.dynamics import kinetic_energy, potential_energy
+from hopping_leg.robot import GRAVITY, DriveMismatch, dynamics, load_robot
 from hopping_leg.robot.model_mismatch import ModelMismatch
 from hopping_leg.sim import LegSimulator
 
@@ -67,8 +66,11 @@ def energy(legs):
         beyond = np.abs(legs.measured_q - legs.q) - reality.of_drives("backlash") / 2
         spring = reality.of_drives("stiffness") * np.maximum(beyond, 0) ** 2
         rotors = (spring + armature * legs.measured_qd**2).sum(axis=1) / 2
-    kinetic = kinetic_energy(robot, legs.q, legs.height_rate, legs.qd)
-    return kinetic + potential_energy(robot, legs.height, legs.q) + rotors
+    speed, (thigh, shank) = legs.state[:, 3:], (robot.thigh, robot.shank)
+    moments = thigh.mass * thigh.com + shank.mass * thigh.length, shank.mass * shank.com
+    potential = robot.mass * legs.height - np.cos(np.cumsum(legs.q, axis=1)) @ moments
+    mass = dynamics.mass_matrix(robot, legs.q)
+    return np.einsum("ni,nij,nj->n", speed, mass, speed) / 2 + GRAVITY * potential + rotors
 
 
 def states(legs, ticks=60):

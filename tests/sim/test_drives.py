@@ -57,7 +57,7 @@ def test_no_command_overtakes_another_nor_is_one_blended_in_what_is_measured(
 ):
     """Commands count up, so that a falling torque would be a command overtaken."""
     legs = make_legs(CAD, 5, robots=[late(command, jitter)] * 4 + [late(command, 0.0, measurement)])
-    legs.reseed(np.random.default_rng(seed))
+    legs.rng = np.random.default_rng(seed)
     legs.place(slice(None), 5.0, POSTURE)
     before = np.zeros((5, 2))
     for tick in range(12):
@@ -90,7 +90,7 @@ def test_the_torque_speed_line_holds_at_every_physics_step(voltage, sign):
         given = legs.step(np.array([[0.0, sign * 1e3]]))[0, 1]
         assert given == pytest.approx(sign * min(line, CAD.knee.torque_limit), abs=1e-12)
         fastest = max(fastest, abs(legs.qd[0, 1]))
-        assert legs.loads[0, 6] == pytest.approx(abs(legs.qd[0, 1]))
+        assert legs.records["loads"][0, 6] == pytest.approx(abs(legs.qd[0, 1]))
         if abs(legs.q[0, 1]) > 2.5:
             break
     assert 0.6 * voltage < fastest / CAD.knee.no_load_speed < 1.05 * voltage

@@ -163,7 +163,7 @@ def worst_difference(robots, ticks, timestep=5e-4, *, fixed_base=False, seed=0):
             worst = max([worst, *np.abs(data.qvel[reference.ahead] - speed)])
         for part in ("foot", "knee", "base"):
             seen[part] += np.count_nonzero(getattr(legs, f"{part}_clearance")() < 0)
-        seen["stop"] += np.count_nonzero(legs.loads[:, 7])
+        seen["stop"] += np.count_nonzero(legs.records["loads"][:, 7])
         seen["still"] += np.count_nonzero(np.abs(legs.qd) < 1e-4)
         legs.state[:] = found[:, :6]
     return worst, seen

@@ -164,7 +164,7 @@ def rollout(
         if perturbation is not None:
             torque = torque + perturbation.torque[tick]
         row[8:10] = plant.drive(torque).T
-        row[14:16], row[16:] = plant.soft_limit_torque.T, legs.loads.T
+        row[14:16], row[16:] = plant.soft_limit_torque.T, legs.records["loads"].T
         if on_tick is not None:
             on_tick(tick + 1, ticks)
     if not np.abs(data[4:6]).max() < _IMPOSSIBLE:

@@ -67,7 +67,7 @@ class EmulatedDrive:
         self.sensed: dict[int, float] = {}  # What its auxiliary ports read, by register
         self._brake, self.nominal_voltage = brake * 2 * math.pi, voltage
         self._commanded = False
-        self._velocity = self._torque = self._asked = 0.0
+        self._velocity = self._torque = 0.0
 
     @property
     def id(self) -> int:
@@ -88,11 +88,6 @@ class EmulatedDrive:
     def active(self) -> bool:
         """Whether the output stage is powered."""
         return self.machine.mode in mode_machine.CONTROLLING
-
-    @property
-    def _amperes(self) -> float:
-        """Phase current, A."""
-        return self._torque / (self.encoder.gear_ratio * torque_law.TORQUE_CONSTANT)
 
     def boot(self, output: float) -> None:
         """Power up with the output at a true position, revolutions."""
@@ -133,7 +128,7 @@ class EmulatedDrive:
         self.machine.advance(time, outside_limits=position < low or position > high)
         self._check()
         self.law.notice = 0
-        wanted = self._asked = self._control(position)
+        wanted = self._control(position)
         if self.active:
             self.machine.fault = self.disturbances.notice or self.law.notice
         if math.isnan(wanted):
@@ -177,12 +172,10 @@ class EmulatedDrive:
             Register.POSITION: self.encoder.position,
             Register.VELOCITY: self._velocity,
             Register.TORQUE: self.encoder.torque_as_reported(self._torque),
-            Register.Q_CURRENT: math.nan if math.isnan(self._asked) else self._amperes,
             Register.HOME_STATE: self.encoder.home,
             Register.VOLTAGE: self.voltage,
             Register.TEMPERATURE: self.temperature,
             Register.FAULT: self.machine.fault,
-            Register.CONTROL_TORQUE: self._asked,
             Register.MILLISECOND_COUNTER: int(self.uptime * 1000),
             Register.MULTIPLEX_ID: self.id,
             **self.sensed,

@@ -408,27 +408,24 @@ class _BootPose(FaultKind, kind="boot_pose"):
             drive.encoder.shift_rotor(self.fault.amount)
 
 
-class _Reversed(FaultKind, kind="reversed"):
-    text = "a motor turns its joint the other way than the robot's file says, from the start"
-    at_start = True
-
-    def begin(self) -> None:
-        for joint in self.fault.joints:
-            self.robot.rewire(joint, -1.0)
-
-
 class _Ratio(FaultKind, kind="ratio"):
     text, unit, value = "a drive believes its joint to turn so many times as far", "1", 2.0
     at_start = True
+    sign: ClassVar[float] = 1.0
 
     @classmethod
     def check(cls, fault: Fault) -> None:
         if not fault.amount > 0:
-            raise UsageError(f"'value' of a ratio is {fault.amount:g} but must be above 0.")
+            raise UsageError(f"'value' of a {fault.kind} is {fault.amount:g} but must be above 0.")
 
     def begin(self) -> None:
         for joint in self.fault.joints:
-            self.robot.rewire(joint, self.fault.amount)
+            self.robot.rewire(joint, self.sign * self.fault.amount)
+
+
+class _Reversed(_Ratio, kind="reversed"):
+    text = "a motor turns its joint the other way than the robot's file says, from the start"
+    unit, value, sign = "", 1.0, -1.0
 
 
 class _Configuration(FaultKind, kind="configuration"):

@@ -46,7 +46,7 @@ class EmulatedLeg:
         self._legs = LegSimulator(
             free, 1, rate=1 / TIMESTEP, timestep=robot_model.TIMESTEP, threads=1
         )
-        self._legs.reseed(np.random.default_rng(seed))
+        self._legs.rng = np.random.default_rng(seed)
         self._legs.stand(slice(None), np.asarray(q, np.float64))
 
     @property

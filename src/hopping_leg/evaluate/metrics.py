@@ -34,8 +34,6 @@ class HopWindow:
     """Time of ``settled`` in which the foot was clear of the ground, s."""
     skipped: int
     """Hops that should have happened and did not."""
-    bounces: int
-    """Bounces that never left the ground."""
     part: Trace
     """The stretch itself."""
 
@@ -81,7 +79,6 @@ def _window(trace: Trace, start: int, end: int, rate: float, drop: float) -> Hop
         settled=hops.ticks / rate,
         flight=hops.flight_ticks / rate,
         skipped=hops.skipped,
-        bounces=hops.bounces,
         part=Trace(trace.table[start:end], trace.header),
     )
 

@@ -58,24 +58,6 @@ def bias_force(robot: Robot, q: Array, qd: Array) -> Array:
     return gravity_force(robot, q) + np.stack([rail, hip, knee], axis=-1)
 
 
-def kinetic_energy(robot: Robot, q: Array, height_rate: Array, qd: Array) -> Array:
-    """Return the kinetic energy with the rotors', (...), J; the base's speed is in m/s, (...)."""
-    speed = np.concatenate([np.asarray(height_rate)[..., None], qd], axis=-1)
-    energy: Array = 0.5 * np.einsum("...i,...ij,...j->...", speed, mass_matrix(robot, q), speed)
-    return energy
-
-
-def potential_energy(robot: Robot, height: Array, q: Array) -> Array:
-    """Return the potential energy, (...), J; zero where all mass lies at ground level."""
-    thigh, shank = robot.thigh, robot.shank
-    q1, q12 = q[..., 0], q[..., 0] + q[..., 1]
-    below = thigh.mass * thigh.com * np.cos(q1) + shank.mass * (
-        thigh.length * np.cos(q1) + shank.com * np.cos(q12)
-    )
-    energy: Array = GRAVITY * (robot.mass * height - below)
-    return energy
-
-
 def _rail_coupling(robot: Robot, q: Array) -> tuple[Array, Array]:
     """Return the first moments of mass about hip and knee, kg m, (...)."""
     thigh, shank = robot.thigh, robot.shank

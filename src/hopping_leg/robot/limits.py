@@ -46,14 +46,9 @@ class MotorLimit:
 
     def __init__(self, robot: Robot) -> None:
         self.limit, self.peak, self._slope = _torque_speed_line(robot)
-        self._gain = robot.of_joints("torque_gain")
-
-    def give(self, torque: Array, qd: Array) -> Array:
-        """Return what the motors give, N m, (..., 2), if asked for so much at a speed, rad/s."""
-        return self._gain * self.clip(torque, qd)
 
     def clip(self, torque: Array, qd: Array) -> Array:
-        """Return ``torque`` within what the motors can do at speed ``qd``, see ``give``."""
+        """Return torques, N m, within what the motors can do at a speed, rad/s, (..., 2) each."""
         drop = self._slope * qd
         upper = np.clip(self.peak - drop, 0.0, self.limit)
         lower = np.clip(-self.peak - drop, -self.limit, 0.0)

@@ -65,7 +65,8 @@ class LegSimulator:
         self.height, self.height_rate = self.state[:, 0], self.state[:, 3]
         self.q, self.qd = self.state[:, 1:3], self.state[:, 4:6]
         self.records: Records = np.zeros(count, stepper.MEMORY)
-        """What each leg remembers besides its state, live, (n,) of ``MEMORY``."""
+        """What each leg remembers besides its state, live, (n,) of ``MEMORY``; its ``LOADS``, (n,
+        8), are what the last control period was for the motors."""
         self._push = np.zeros(count)
         self.command = np.zeros((count, stepper.COMMAND))
         """What drives are commanded beside the torques that ``step`` takes, live."""
@@ -130,16 +131,6 @@ class LegSimulator:
     def measured_torque(self) -> Array:
         """What the motors' torque measurement reports now, N m at the joints, (n, 2)."""
         return self._reading[:, 4:6] if self._disturbed else self.records["motor_torque"]
-
-    @property
-    def loads(self) -> Array:
-        """What the last control period was for the motors, (n, 8), see ``LOADS``."""
-        loads: Array = self.records["loads"]
-        return loads
-
-    def reseed(self, rng: np.random.Generator) -> None:
-        """Take jitter and sensor noise from here on from another source."""
-        self.rng = rng
 
     def push(self, force: Array) -> None:
         """Push the bases upward from now on, N, (n,)."""

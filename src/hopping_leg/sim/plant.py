@@ -65,7 +65,7 @@ class Plant:
     ) -> None:
         self.legs = legs
         self.channel = Channel(legs.count, disturbance, legs.period, rng, disturbed)
-        legs.reseed(rng.spawn(1)[0])
+        legs.rng = rng.spawn(1)[0]
         self._limiter = SoftLimiter(legs.robot, soft_limits) if soft_limits else None
         self._samples: Array = np.empty((0, 3, 5))
         self.soft_limit_torque: Array = np.zeros((legs.count, 2))
@@ -73,7 +73,7 @@ class Plant:
     def reseed(self, rng: np.random.Generator) -> None:
         """Take all randomness from here on from another source."""
         self.channel.reseed(rng)
-        self.legs.reseed(rng.spawn(1)[0])
+        self.legs.rng = rng.spawn(1)[0]
 
     def sense(self, command: Array) -> Measurement:
         """Return what the controllers see; ``command`` is the desired height, m, (n,)."""
