@@ -38,6 +38,7 @@ class HopMeasurement:
     ticks: int
     flight_ticks: int
     skipped: int
+    bounces: int
 
 
 @dataclass(frozen=True)
@@ -78,11 +79,13 @@ def measure_hops(
     hops = find_hops(height, velocity, clearance)
     counted = hops.tick >= first
     bounces = find_bounces(height, clearance)
+    bounces = bounces[bounces >= first]
     return HopMeasurement(
         hops.apex[counted],
         len(height) - first,
         int(hops.in_flight[first:].sum()),
-        count_skipped(hops.tick[counted], bounces[bounces >= first], first, len(height), rate),
+        count_skipped(hops.tick[counted], bounces, first, len(height), rate),
+        len(bounces),
     )
 
 

@@ -41,10 +41,10 @@ def test_a_steady_run():
     window = window_of(sine_trace())
     assert window.command == 0.30
     assert len(window.apex) == 16
-    assert window.error == pytest.approx(0.01, abs=1e-4)
+    assert window.apex - window.command == pytest.approx(0.01, abs=1e-4)
     assert window.settled == pytest.approx(8.0)
     assert window.flight / window.settled == pytest.approx(0.48, abs=0.02)
-    assert window.skipped == 0
+    assert window.skipped == window.bounces == 0
     row = summarise("c", 0.30, [window], 0)
     assert row.min_base_height_m == pytest.approx(0.11, abs=1e-3)
     assert row.max_sink_m == pytest.approx(0.05, abs=1e-3)

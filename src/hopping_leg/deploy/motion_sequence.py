@@ -44,11 +44,6 @@ class SequenceTiming:
     fade: float = 0.3
     """Fading of the gains at the end of the sinking."""
 
-    @property
-    def before_hop(self) -> float:
-        """From the beginning to the hop."""
-        return self.rise + self.squat + self.settle
-
     def phase(self, elapsed: float) -> tuple[Part, float]:
         """Return the part at a time since the start, and how long it has lasted."""
         for phase, seconds in (
@@ -178,7 +173,8 @@ class MotionSequence:
         """Return the height commanded at a time, m."""
         if self._began is None:
             return self.commands.at(0.0)
-        return self.commands.at(max(time - self._began - self.timing.before_hop, 0.0))
+        before = self.timing.rise + self.timing.squat + self.timing.settle
+        return self.commands.at(max(time - self._began - before, 0.0))
 
     def _hold(self, phase: Part, lasted: float, q: Array, qd: Array) -> Array:
         """Return the torque of rising, squatting, standing or sinking."""

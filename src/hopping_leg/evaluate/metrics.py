@@ -34,6 +34,8 @@ class HopWindow:
     """Time of ``settled`` in which the foot was clear of the ground, s."""
     skipped: int
     """Hops that should have happened and did not."""
+    bounces: int
+    """Bounces that never left the ground."""
     part: Trace
     """The stretch itself."""
 
@@ -46,11 +48,6 @@ class HopWindow:
     def knee_contacts(self) -> int:
         """Times the knee touched the ground, over the whole stretch."""
         return motor_load.events(self.part.column("knee_clearance_m") <= 0)
-
-    @property
-    def error(self) -> Array:
-        """Apex minus command, m, (hops,)."""
-        return self.apex - self.command
 
 
 def measure(trace: Trace) -> list[HopWindow]:
@@ -79,6 +76,7 @@ def _window(trace: Trace, start: int, end: int, rate: float, drop: float) -> Hop
         settled=hops.ticks / rate,
         flight=hops.flight_ticks / rate,
         skipped=hops.skipped,
+        bounces=hops.bounces,
         part=Trace(trace.table[start:end], trace.header),
     )
 
@@ -104,10 +102,9 @@ def errors_of(windows: Sequence[HopWindow]) -> list[Array]:
     """
     rates = [len(w.apex) / w.settled for w in windows if len(w.apex)]
     rate = float(np.median(rates)) if rates else 0.0
-    return [
-        w.error if len(w.apex) else np.full(max(1, round(rate * w.settled)), w.standing - w.command)
-        for w in windows
-    ]
+    missed = (np.full(max(1, round(rate * w.settled)), w.standing) for w in windows)
+    pairs = zip(windows, missed, strict=True)
+    return [(w.apex if len(w.apex) else instead) - w.command for w, instead in pairs]
 
 
 def pooled_apexes(windows: Sequence[HopWindow]) -> Array:

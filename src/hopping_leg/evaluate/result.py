@@ -43,6 +43,7 @@ class Summary(MotorLoad):
     hops: int
     """In-flight apexes counted."""
     skipped_hops: int
+    stance_bounces: int
     hop_rate_hz: float
     flight_fraction: float
     min_base_height_m: float
@@ -227,6 +228,7 @@ def summarise(
         iqr_m=float(quartiles[1] - quartiles[0]),
         hops=len(apex),
         skipped_hops=sum(w.skipped for w in windows),
+        stance_bounces=sum(w.bounces for w in windows),
         hop_rate_hz=len(apex) * per_second,
         flight_fraction=sum(w.flight for w in windows) * per_second,
         min_base_height_m=float(whole["height_m"].to_numpy().min()),
