@@ -45,7 +45,7 @@ def within_reach(recipe: Recipe, robot: Robot) -> tuple[Recipe, float]:
     """Return a recipe for the heights that its teacher reaches, and the teacher's worst score, m.
 
     A recipe without a teacher stays as it is. The heights are the longest run of centimetres
-    without a skipped hop and with a small median error.
+    without a skipped hop or a body on the ground, and with a small median error.
 
     Raises:
         UsageError: There are none.
@@ -75,8 +75,9 @@ def _longest_run(
 
 
 def _hops(result: CommandResult, most: float) -> bool:
-    """Tell whether hops came without a skipped one and with at most so much median error, m."""
-    return result.hops > 0 and result.skipped_hops == 0 and abs(result.median_error_m) <= most
+    """Tell whether hops missed by so much at most, m, none skipped and no body on the ground."""
+    clean = result.hops > 0 and result.skipped_hops == 0 and result.body_contact_ticks == 0
+    return clean and abs(result.median_error_m) <= most
 
 
 @dataclass(frozen=True)

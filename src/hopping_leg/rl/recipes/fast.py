@@ -4,6 +4,7 @@ Rollouts are short and gradient steps many: a student has to meet the states in 
 still soon.
 """
 
+from hopping_leg.controllers.mpc import Planning
 from hopping_leg.envs import TaskConfig
 from hopping_leg.rl import recipe
 from hopping_leg.rl.distillation.dagger import DaggerConfig
@@ -20,7 +21,13 @@ FAST = recipe.Recipe(
         episode=8.0,
         random_episode_start=True,
     ),
-    algorithm=DaggerConfig(learning_rate=2e-3, n_steps=32, gradient_steps=32, batch_size=2048),
+    algorithm=DaggerConfig(
+        learning_rate=2e-3,
+        n_steps=32,
+        gradient_steps=32,
+        batch_size=2048,
+        planning=Planning(elastic_timestep=5e-4),
+    ),
     network=StudentConfig(hidden=(128, 64)),
     schedule=recipe.Schedule(num_envs=256, steps=1_200_000, log_every=8),
     selection=recipe.SelectionConfig(
