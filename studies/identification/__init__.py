@@ -16,6 +16,6 @@ RESULTS = (
     "python -m studies.identification --parts recordings --json "
     "studies/identification/results/recordings.json",
     "python -m studies.identification.real_leg --out "
-    "src/hopping_leg/robot/robots/legv2-elastic.toml --json "
+    "src/hopping_leg/robot/robots/legv2-identified.toml --json "
     "studies/identification/results/real_leg.json",
 )

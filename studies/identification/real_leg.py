@@ -1,4 +1,4 @@
-"""Write ``legv2-elastic``: leg V2 with its belt, as all of the lab's recordings of it tell it.
+"""Write ``legv2-identified``: leg V2 with its belt, as all of the lab's recordings of it tell it.
 
 ``python -m studies.identification.real_leg --out FILE`` reads the recordings and writes the robot
 file, and what else was found with ``--json``. Hops on both booms tell knee, belt,
@@ -233,7 +233,7 @@ def identify(folder: Path) -> dict[str, Any]:
 def robot_tree(found: Mapping[str, Any]) -> Tree:
     """Return the robot file's tables."""
     tree: Tree = {
-        "name": "legv2-elastic",
+        "name": "legv2-identified",
         "description": "leg V2 with its belt, as the lab's recordings tell it",
         "extends": "legv2",
     }
@@ -252,7 +252,7 @@ def robot_tree(found: Mapping[str, Any]) -> Tree:
 class RealLeg:
     """Identify leg V2 from the lab's recordings on three rigs, and judge it on all of them."""
 
-    out: Path = Path("legv2-elastic.toml")
+    out: Path = Path("legv2-identified.toml")
     """Robot file to write."""
     recordings: Path | None = None
     """Folder with real recordings; default: the environment's HOPPING_LEG_RECORDINGS."""

@@ -25,11 +25,8 @@ from studies.shared import ROOT, recordings_folder, show_rows
 
 LEFT_OUT = ROOT / "studies/identification/results/real_leg.json"
 """What ``python -m studies.identification.real_leg`` found without each recording."""
-IDENTIFIED = "legv2-elastic"
-ROBOTS = {
-    "legv2": "CAD", "legv2-paper": "Table I", "legv2-identified": "identified, rigid",
-    IDENTIFIED: "identified with belt", "legv1": "CAD",
-}  # fmt: skip
+IDENTIFIED = "legv2-identified"
+ROBOTS = {"legv2": "CAD", "legv2-paper": "Table I", IDENTIFIED: "identified", "legv1": "CAD"}
 """What each robot is; ``legv1`` is the rail's."""
 DRIVES = {"measured": "torques as measured", "law": "the logged law"}
 PAPER_MM = "40 to 60"

@@ -60,10 +60,11 @@ def test_hops_are_calm_and_the_foot_alone_touches_the_ground(hopped):
 
 def test_legs_that_differ_hop_as_high_each_on_any_number_of_threads(monkeypatch):
     monkeypatch.setattr(leg_simulator, "_STEPS_PER_THREAD", 1)
-    robots = sample(ROBOT, IDENTIFIABLE_RANGES, 6, np.random.default_rng(0))
+    legv2 = load_robot("legv2")
+    robots = sample(legv2, IDENTIFIABLE_RANGES, 6, np.random.default_rng(0))
     commands = np.tile([0.25, 0.32], 3)
     one, other = (
-        hop(ROBOT, commands, legs=LegSimulator(ROBOT, 6, timestep=STEP, threads=n, robots=robots))
+        hop(legv2, commands, legs=LegSimulator(legv2, 6, timestep=STEP, threads=n, robots=robots))
         for n in (1, 3)
     )
     check_apexes(one, commands)

@@ -193,7 +193,7 @@ def test_the_vector_environment_does_as_gymnasiums_own(mode):
     np.testing.assert_array_equal(one[0], other[0])
     same(one[1], other[1])
     for tick in range(150):
-        push = np.array([[0.6, -0.5], [0.1, 0.2]], np.float32) * (-1) ** (tick // 15)
+        push = np.array([[-0.6, 0.5], [0.1, 0.2]], np.float32) * (-1) ** (tick // 15)
         one, other = ours.step(push), theirs.step(push)
         assert [part.dtype for part in one[:4]] == [part.dtype for part in other[:4]]
         assert ours.observation_space.contains(one[0])

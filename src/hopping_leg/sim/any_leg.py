@@ -188,7 +188,8 @@ def draw_any_leg(seed: int) -> AnyLeg:
             true = _draw(true, RUBBING, rng)
         if rng.random() < _SMALL:
             true = _draw(true, SMALL_ARMATURE, rng)
-    believed = _fitted(design, true, rng) if rng.random() < _IDENTIFIED else design
+    told = _fitted(design, true, rng) if rng.random() < _IDENTIFIED else design
+    believed = replace(told, reality=_base().reality)
     if rng.random() >= _EXACT:
         true = _draw(true, GAINS, rng)
     true = _late(true, rng)

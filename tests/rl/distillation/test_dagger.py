@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import torch
 
-from hopping_leg.controllers.mpc import TrueStateMpc
 from hopping_leg.envs.hidden_state import OF_MOTION
 from hopping_leg.rl.distillation.dagger import DaggerConfig
 from hopping_leg.sim import Measurement, leg_simulator
@@ -127,7 +126,7 @@ def test_a_clock_hastens_the_schedules_and_never_delays_them():
 
 def test_the_label_is_what_mpc_does_in_the_true_state():
     made = learner(TINY_FAST)
-    other = TrueStateMpc(ROBOT, TINY_FAST.algorithm.teacher)
+    other = TINY_FAST.algorithm.make_teacher(made.task)
     other.watch(made.task.legs)
     other.reset(made.task.count)
     for _ in range(40):
@@ -170,7 +169,7 @@ def test_a_policy_for_any_leg_acts_on_each_as_the_student_did():
 
 
 def test_a_push_counts_more_and_what_is_hidden_is_guessed():
-    made = learn(learner(TINY_UNIVERSAL), 8 * 32 * 4)
+    made = learn(learner(TINY_UNIVERSAL), 16 * 32 * 4)
     state = made._buffer.state()
     config = TINY_UNIVERSAL.algorithm
     assert set(np.unique(state["weights"])) == {1.0, config.push_weight, config.fold_weight}

@@ -62,10 +62,17 @@ def shape_hop(p: Record, shape: Record, command: float, hop: Record) -> None:
         hop.flight + shape.least_push * length + shape.liftoff_per_drop * drop,
         shape.liftoff * length,
     )
+    highest = min(hop.flight, hop.liftoff) - _LEAST_STROKE * length
     squat = shape.squat * length - shape.squat_per_drop * drop
-    hop.squat = min(squat, min(hop.flight, hop.liftoff) - _LEAST_STROKE * length)
-    hop.squat = max(hop.squat, folded)
-    hop.stop = shape.braking * p.gravity * drop / max(hop.flight - hop.squat, 0.02 * length)
+    hop.squat = max(min(squat, highest), folded)
+    stop = shape.braking * p.gravity * drop
+    if p.elastic[1] > 0:
+        # The leg folds further by what the knee's belt gives under the force that stops it.
+        to_knee = (hop.squat + (thigh * thigh - shank * shank) / hop.squat) / 2
+        arm = max(thigh * thigh - to_knee * to_knee, 0.0)  # squared
+        force = p.mass * (p.gravity + stop / max(hop.flight - hop.squat, 0.02 * length))
+        hop.squat = max(min(hop.squat + force * arm / p.belt_stiffness[1], highest), folded)
+    hop.stop = stop / max(hop.flight - hop.squat, 0.02 * length)
 
 
 @inlined

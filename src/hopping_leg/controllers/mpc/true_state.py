@@ -56,7 +56,7 @@ class HopShape:
     """Least gap between knee and ground."""
     squat: float = 0.61
     """Height of the hip, less the foot's radius, at which landing ends."""
-    squat_per_drop: float = 0.17
+    squat_per_drop: float = 0.2
     """By how much lower it ends per height that the leg falls."""
     liftoff: float = 0.81
     """Height of the hip at which the push ends at most: with a longer leg the knee would be too

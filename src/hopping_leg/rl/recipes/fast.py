@@ -29,7 +29,7 @@ FAST = recipe.Recipe(
         planning=Planning(elastic_timestep=5e-4),
     ),
     network=StudentConfig(hidden=(128, 64)),
-    schedule=recipe.Schedule(num_envs=256, steps=1_200_000, log_every=8),
+    schedule=recipe.Schedule(num_envs=256, steps=500_000, log_every=8),
     selection=recipe.SelectionConfig(
         eval_every=10**9,
         eval_commands=(0.22, 0.26, 0.30, 0.34, 0.38, 0.42),

@@ -13,8 +13,8 @@ from hopping_leg.rl.recipes.fast import FAST
 PRECISE = recipe.Recipe(
     name="precise",
     task=FAST.task,
-    algorithm=DaggerConfig(),
+    algorithm=DaggerConfig(planning=FAST.algorithm.planning),
     network=StudentConfig(),
-    schedule=recipe.Schedule(num_envs=256, steps=7_000_000, log_every=16),
+    schedule=recipe.Schedule(num_envs=256, steps=4_000_000, log_every=16),
     selection=FAST.selection,
 )

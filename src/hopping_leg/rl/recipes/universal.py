@@ -40,7 +40,7 @@ UNIVERSAL = recipe.Recipe(
         impulse=0.5,
         outlier=0.15,
         hidden_weight=0.3,
-        teacher=HopShape(fold=-0.4, knee_gap=0.06, squat_per_drop=0.26),
+        teacher=HopShape(fold=-0.4, knee_gap=0.06),
         planning=Planning(
             timestep=1.25e-3, elastic_timestep=5e-4, simulations=3, tolerance=3e-4, every=2
         ),
