@@ -19,16 +19,6 @@ def _precise(policy: str, name: str, options: str = "") -> str:
     return _trials(f"{policy} {_BASELINES}", f"{name}.json", options)
 
 
-def _other(robot: str) -> tuple[str, str]:
-    """Return the commands that train `precise` on another robot and evaluate it there."""
-    run = f"runs/precise-{robot}"
-    return (
-        f"test -e {run}/policy.onnx || "
-        f"hop train --recipe precise --robot {robot} --resume --out {run}",
-        _precise(f"precise={run}/policy.onnx", f"precise_{robot}", f"--robot {robot}"),
-    )
-
-
 def _universal(robot: str) -> str:
     """Return the command that evaluates `universal` on a robot, beside energy shaping."""
     options = f"--seeds 5 --seed {_FRESH} --robot {robot}"
@@ -37,9 +27,6 @@ def _universal(robot: str) -> str:
 
 LEGS = ("legv2-identified", "legv2", "legv2-paper", "legv1")
 """Robots on which `universal` is evaluated."""
-
-_ELSEWHERE = ("legv2", "legv2-paper")
-"""Robots on which `precise` is trained, too."""
 
 RESULTS = (
     _trials(
@@ -52,7 +39,6 @@ RESULTS = (
     _precise("precise", "precise"),
     _precise("precise", "precise_fine_step", "--timestep 3.125e-05"),
     _precise("precise", "precise_no_soft_limits", "--no-soft-limits"),
-    *(command for robot in _ELSEWHERE for command in _other(robot)),
     f"hop evaluate fast precise universal {_BASELINES} energy-shaping-literal --seeds 3 "
     f"--seed {_FRESH} --suite robustness --out runs/results/robustness "
     "--json studies/evaluation/results/robustness.json",

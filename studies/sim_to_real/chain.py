@@ -37,9 +37,8 @@ class Experiment:
     twins need 20."""
     methods: tuple[str, ...] = DEFAULT
     """What policies are trained on, the others being compared with the first. Valid: identified,
-    identified-belt, cad, table-1, truth; those whose legs differ in training,
-    identified-posterior and randomised; and, not trained, energy-shaping, energy-shaping-tuned,
-    universal, universal-identified."""
+    identified-belt, cad, table-1, truth, randomised, whose legs differ in training; and, not
+    trained, energy-shaping, energy-shaping-tuned, universal, universal-identified."""
     seeds: tuple[int, ...] = (0,)
     """Seeds of the trainings, one of each method and twin each."""
     recipe: str = "fast"
@@ -154,13 +153,7 @@ class Chain:
         """Return the job of a training; what does not depend on the twin is trained once."""
         source = self.source(twin, method)
         recipe = get_recipe(self.asked.recipe).replace({"steps": self.asked.steps})
-        if method.ranges == "intervals":
-            fitted = json.loads(Path(source).with_suffix(".json").read_bytes())["result"][
-                "parameters"
-            ]
-            recipe = recipe.replace({"task.randomised": steps.interval_ranges(fitted)})
-        else:
-            recipe = randomise(recipe, method.ranges)
+        recipe = randomise(recipe, method.ranges)
         robot = simulated(source, belt=method.belt)
         asked = {"recipe": repr(recipe), "robot": robot.digest, "seed": seed}
         name = f"{twin.name}-{method.name}"

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 from hopping_leg.controllers.registry import ENERGY_SHAPING
 from hopping_leg.errors import UsageError, unknown_name
@@ -19,8 +18,7 @@ class Method:
         fitted: Whether the robot is the twin as it is identified from recordings.
         belt: Whether the fit and training know a belt, with assumed backlash and jitter.
         robot: Robot that is trained on without a fit; None takes the one that the twin extends.
-        ranges: What every leg in training draws for itself, around the robot; ``intervals`` of
-            the fit, or those of ``hop train``.
+        ranges: What every leg in training draws for itself, around the robot.
         truth: Whether the twin's own file is the robot, [reality] left out but for the delay:
             what a perfect fit would find.
         untrained: Controller that hops as it is; empty where there is a training. It is told the
@@ -33,7 +31,7 @@ class Method:
     fitted: bool = False
     belt: bool = False
     robot: str | None = None
-    ranges: Randomise | Literal["intervals"] = "none"
+    ranges: Randomise = "none"
     truth: bool = False
     untrained: str = ""
     tuned: bool = False
@@ -44,12 +42,6 @@ METHODS = {
     for method in (
         Method("identified", "identified from both recordings", fitted=True),
         Method("identified-belt", "identified, with the knee's belt", fitted=True, belt=True),
-        Method(
-            "identified-posterior",
-            "identified, every leg drawn from the intervals of the fit",
-            fitted=True,
-            ranges="intervals",
-        ),
         Method("cad", "CAD defaults"),
         Method("table-1", "the paper's Table I", robot="legv2-paper"),
         Method("randomised", "domain randomisation over the twins' ranges", ranges="twins"),

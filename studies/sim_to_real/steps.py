@@ -22,7 +22,6 @@ from hopping_leg.rl.run_folder import read_result
 from hopping_leg.rl.train import train
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim import Measurement
-from hopping_leg.sim.randomization import RANDOMIZABLE, Range
 from studies.energy_shaping.tune import Tune
 from studies.shared import Row
 from studies.sim_to_real.twins import Noise, Twin, disturbance_of, with_play
@@ -99,21 +98,6 @@ def _truth(robot: Robot, name: str) -> float | None:
     if name == "drive.delay":
         return robot.reality.latency.command
     return None if name.startswith("drive.") else LegHypothesis(robot).get(name)
-
-
-def interval_ranges(parameters: Sequence[Row]) -> tuple[Range, ...]:
-    """Return the intervals of a fit as ranges, of the numbers that may differ from leg to leg.
-
-    What the data say nothing about spans what the fit searched. Correlations are left out.
-    """
-    found = []
-    for row in parameters:
-        low, high = row["interval_low"], row["interval_high"]
-        if low is None or high is None:  # not finite
-            low, high = row["bound_low"], row["bound_high"]
-        if row["name"] in RANDOMIZABLE:
-            found.append(Range(row["name"], row["unit"], low, high, "95 % interval of the fit"))
-    return tuple(found)
 
 
 def learn(recipe: Recipe, robot: Robot, seed: int, folder: Path) -> Row:

@@ -119,17 +119,6 @@ def test_what_does_not_depend_on_twin_or_seed_is_done_once(tmp_path):
     assert shaped == [("twin-0", 0), ("twin-1", 0)]
 
 
-def test_legs_are_drawn_from_the_intervals_of_the_fit(tmp_path):
-    fits = [("hip.friction", 0.1, 0.2), ("rail.friction", None, None), ("drive.delay", 0.0, 0.1)]
-    ranges = steps.interval_ranges(
-        {"name": name, "interval_low": low, "interval_high": high}
-        | {"unit": "", "bound_low": 0.0, "bound_high": 2.0}
-        for name, low, high in fits
-    )
-    found = [(r.path, r.low, r.high) for r in ranges]
-    assert found == [("hip.friction", 0.1, 0.2), ("rail.friction", 0.0, 2.0)]
-
-
 @pytest.mark.slow
 def test_a_twin_is_recorded_to_its_stops_and_identified_from_that_alone(tmp_path):
     one = Chain(Experiment(("1",), ("identified",), folder=tmp_path, seconds=30.0))
