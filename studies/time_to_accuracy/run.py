@@ -30,7 +30,7 @@ from studies.time_to_accuracy import sb3
 JUDGING_SEEDS = (1000, 1001)
 """Seeds of noise and delay that chose nothing."""
 
-SHARES = {"fast": (0.25, 0.5, 1.0), "precise": (0.25, 1.0)}
+SHARES = {"fast": (0.25, 0.5, 1.0)}
 """Shares of the recipe's steps of the trainings of a distillation."""
 
 _SPACING = 0.02
