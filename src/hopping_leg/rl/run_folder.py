@@ -114,7 +114,7 @@ def _name(function: object) -> str:
 def model_card(result: dict[str, Any]) -> str:
     """Return the card of a training, as Markdown, from its result."""
     selected, task, name = result["selected"], result["options"]["task"], result["robot"]
-    commands = task["command_range"] or (min(task["commands"]), max(task["commands"]))
+    commands = result["command_bounds"]
     versions = ", ".join(f"{name} {number}" for name, number in result["versions"].items())
     robot = f"`{name}`" if name in shipped_robots() else f"{name}, `{ROBOT_FILE}` in this folder"
     any_leg = result["options"]["legs"] == "any"

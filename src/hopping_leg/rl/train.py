@@ -195,6 +195,7 @@ class Trainer:
         result = {
             **self.folder.config,
             "command": command,
+            "command_bounds": self.recipe.task.command_bounds,
             "minutes": minutes,
             "steps": steps,
             "selected": selected,
