@@ -39,8 +39,8 @@ RESULTS = (
     _precise("precise", "precise"),
     _precise("precise", "precise_fine_step", "--timestep 3.125e-05"),
     _precise("precise", "precise_no_soft_limits", "--no-soft-limits"),
-    f"hop evaluate fast precise universal {_BASELINES} energy-shaping-literal --seeds 3 "
-    f"--seed {_FRESH} --suite robustness --out runs/results/robustness "
+    f"hop evaluate fast universal energy-shaping --seeds 3 --seed {_FRESH} "
+    "--suite robustness --out runs/results/robustness "
     "--json studies/evaluation/results/robustness.json",
     "cp runs/results/robustness/robustness.svg studies/evaluation/figures",
     f"hop evaluate paper {_BASELINES} --seeds 3 --suite robustness "

@@ -32,7 +32,7 @@ RESULTS = (
     "--folder runs/transfer-universal --json studies/sim_to_real/results/universal.json",
     *(
         "python -m studies.sim_to_real transfer --methods identified-belt identified cad table-1 "
-        "randomised energy-shaping energy-shaping-tuned --seeds 0 1 2 --steps 300000 "
+        "randomised energy-shaping --steps 300000 "
         f"--disturbance {noise} --jobs 2 --folder runs/transfer-fast "
         f"--json studies/sim_to_real/results/fast_noise_{noise}.json"
         for noise in ("on", "off")
