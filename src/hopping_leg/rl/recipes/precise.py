@@ -5,6 +5,7 @@ push, so that nothing has to be found by trial and error. Longer, wider and on m
 ``fast``.
 """
 
+from hopping_leg.controllers.mpc import Planning
 from hopping_leg.rl import recipe
 from hopping_leg.rl.distillation.dagger import DaggerConfig
 from hopping_leg.rl.distillation.students import StudentConfig
@@ -13,7 +14,7 @@ from hopping_leg.rl.recipes.fast import FAST
 PRECISE = recipe.Recipe(
     name="precise",
     task=FAST.task,
-    algorithm=DaggerConfig(planning=FAST.algorithm.planning),
+    algorithm=DaggerConfig(planning=Planning(elastic_timestep=5e-4)),
     network=StudentConfig(),
     schedule=recipe.Schedule(num_envs=256, steps=4_000_000, log_every=16),
     selection=FAST.selection,
