@@ -17,7 +17,7 @@ from hopping_leg.evaluate.result import summarise
 from hopping_leg.hop_detection import trace_hops
 from hopping_leg.io import plain
 from hopping_leg.robot import DEFAULT_ROBOT, TIMESTEP, Robot, load_robot
-from hopping_leg.sim import CONTROL_RATE, NO_NOISE, NoiseAndDelay, Simulator
+from hopping_leg.sim import CONTROL_RATE, NO_NOISE, LegSimulator, NoiseAndDelay
 from hopping_leg.trace import Trace
 from studies.shared import Row, show_rows
 
@@ -55,7 +55,7 @@ class Case:
 class Knowing(LiteralEnergyShaping):
     """Energy shaping that the simulator tells of contact, base velocity and apexes."""
 
-    def watch(self, legs: Simulator) -> None:
+    def watch(self, legs: LegSimulator) -> None:
         """Take the legs, live."""
         self.legs = legs
         self._highest = np.zeros(legs.count)

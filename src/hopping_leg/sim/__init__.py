@@ -11,6 +11,3 @@ from hopping_leg.sim.leg_simulator import compile_physics as compile_physics
 from hopping_leg.sim.plant import Plant as Plant
 from hopping_leg.sim.plant import SoftLimiter as SoftLimiter
 from hopping_leg.sim.stepper import LOADS as LOADS
-
-Simulator = LegSimulator
-"""As controllers are shown it that see the legs themselves."""

@@ -12,9 +12,8 @@ import numpy as np
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.controllers.mpc import hop_law
 from hopping_leg.controllers.protocol import Measurement
-from hopping_leg.errors import UsageError
 from hopping_leg.robot import GRAVITY, Robot
-from hopping_leg.sim import CONTROL_RATE, LegSimulator, Simulator, stepper
+from hopping_leg.sim import CONTROL_RATE, LegSimulator, stepper
 from hopping_leg.sim.leg_table import leg_table
 
 _TICKS = 200
@@ -123,16 +122,8 @@ class TrueStateMpc:
         self.robot, self.planning, self.period = robot, planning or Planning(), 1 / rate
         self._shapes = np.array([astuple(shape or HopShape())], _SHAPE)
 
-    def watch(self, legs: Simulator) -> None:
-        """Take the legs, live.
-
-        Raises:
-            UsageError: They are not the stepper's.
-        """
-        if not isinstance(legs, LegSimulator):
-            raise UsageError(
-                "MPC in the true state plans on the stepper; let it meet a LegSimulator."
-            )
+    def watch(self, legs: LegSimulator) -> None:
+        """Take the legs, live."""
         self._legs = legs
 
     def reset(self, count: int) -> None:
