@@ -5,8 +5,6 @@ import pytest
 
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.mpc import TrueStateMpc
-from hopping_leg.controllers.registry import load_controller
-from hopping_leg.errors import UsageError
 from hopping_leg.io import replace_at
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import LegSimulator, leg_simulator
@@ -83,10 +81,3 @@ def test_commands_under_way_are_planned_with(latency):
     """But their noise is not."""
     robot = replace_at(ROBOT, "reality.latency.command", latency)
     check_apexes(hop(robot, HEIGHTS[::3]), HEIGHTS[::3], most=0.003)
-
-
-def test_it_is_for_simulated_legs_of_the_stepper_alone():
-    with pytest.raises(UsageError, match="true state"):
-        load_controller("mpc-true-state", ROBOT)
-    with pytest.raises(UsageError, match="stepper"):
-        load_controller("mpc-true-state", ROBOT, simulated=True).watch(object())
