@@ -1,7 +1,7 @@
 """Real recordings: each in turn is held out while the others are fitted with the default plan."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from hopping_leg.errors import UsageError
@@ -17,10 +17,13 @@ RIGS = {
     "leg V2, fixed base": "legv2_fixed_base",
 }
 """Folder of each rig's recordings."""
+HALVES = {"leg V2, fixed base": "halves of leg V2"}
+"""Rigs of which first halves are fitted, too, and judged by each second half: no other recording
+moves as fast as the fastest, and slower ones do not tell what limits it."""
 
 
 def real(study: Study, folder: Path) -> Row:
-    """Identify every leave-one-out split of every rig.
+    """Identify every leave-one-out split of every rig, and of halves.
 
     Args:
         study: Threads and seed.
@@ -36,12 +39,15 @@ def real(study: Study, folder: Path) -> Row:
     rows = []
     for rig, name in RIGS.items():
         recordings = [load_recording(path) for path in sorted((folder / name).glob("*.csv.gz"))]
-        for held in recordings if len(recordings) > 1 else []:
-            fitted = [r for r in recordings if r is not held]
-            short = f"real-{name}-without-{held.name.split('.')[0]}"
-            asked = {"fitted": [r.digest for r in fitted], "held": held.digest, "seed": study.seed}
-            row = study.once(short, asked, _split, fitted, held)
-            rows.append({"rig": rig, "held_out": held.name, **row})
+        splits = [(rig, [r for r in recordings if r is not held], held) for held in recordings]
+        if rig in HALVES:  # what is fitted has no digest: it is not the judge's part
+            first = [replace(r.part(0, len(r) // 2), digest="") for r in recordings]
+            splits += [(HALVES[rig], first, r.part(len(r) // 2, len(r))) for r in recordings]
+        for kind, fitted, held in splits if len(recordings) > 1 else []:
+            asked = {"held": held.digest, "fitted": [r.name for r in fitted], "seed": study.seed}
+            asked["files"] = [r.digest for r in recordings]
+            row = study.once(f"{kind}-without-{held.name}", asked, _split, fitted, held)
+            rows.append({"rig": kind, "held_out": held.name, **row})
     if not rows:
         known = " and ".join(RIGS.values())
         raise UsageError(f"{folder} has no two recordings in its folders {known}.")
@@ -54,11 +60,13 @@ def _split(study: Study, fitted: Sequence[Recording], held: Recording) -> Row:
     identified, took = timed(
         lambda: identify(fitted, robot, validate=[held], options=options, seed=study.seed)
     )
+    known = identified.identifiability
     after, before = (_flat(asdict(v)) for v in (identified.validation, identified.start_validation))
     return {
         **after,
         "before": before,
         "fitted": len(identified.identifiability.names),
+        "at_bound": [n for n, at in zip(known.names, known.at_bound, strict=True) if at],
         "candidates": sum(one.found.evaluations for one in identified.passes),
         **took,
     }

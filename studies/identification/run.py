@@ -11,7 +11,7 @@ from hopping_leg.identify.result import software_versions
 from hopping_leg.robot.parameters import JOINTS
 from studies.identification.arm import coverage
 from studies.identification.known import FIXED, HOPPING, METHODS, RAIL, paper_size, synthetic
-from studies.identification.real import real
+from studies.identification.real import HALVES, real
 from studies.identification.study import Study
 from studies.shared import Row, host
 
@@ -22,16 +22,19 @@ ARM_SECONDS = 12.0
 PAPER_METHODS = ("least-squares", "two-pass")
 """Searches on recordings of the paper's size."""
 
-
+_SLOW, _FAST = (f"{HALVES['leg V2, fixed base']}, dcr1_seg{n}" for n in (0, 4))
 _REAL = (
     ("double", "predicted_0_2_s_rms_rad", "double pendulum, 0.2 s ahead", "mrad", (12.0, 29.0)),
     ("double", "predicted_0_5_s_rms_rad", "double pendulum, 0.5 s ahead", "mrad", (33.0, 95.0)),
     ("leg V2", "closed_loop_position_rms_rad", "leg V2, position", "mrad", (25.0, 3.0)),
     ("leg V2", "closed_loop_torque_rms_nm", "leg V2, torque", "N m", (0.14, 0.4)),
+    (_SLOW, "closed_loop_position_rms_rad", "leg V2, slow halves, position", "mrad", (25.0, 3.0)),
+    (_SLOW, "closed_loop_torque_rms_nm", "leg V2, slow halves, torque", "N m", (0.14, 0.4)),
+    (_FAST, "closed_loop_position_rms_rad", "leg V2, fast halves, position", "mrad", (25.0, 15.0)),
 )
-"""Bars of real recordings: beginning of the rig's name, number, in words, unit, hip and knee."""
+"""Bars of real recordings: beginning of rig and recording, number, in words, unit, hip and knee."""
 
-_JOINTS = {"double": ("joint 1", "joint 2"), "leg V2": JOINTS}
+_JOINTS = {"double": ("joint 1", "joint 2")}
 
 
 def bars(result: Row) -> list[Row]:
@@ -54,10 +57,13 @@ def bars(result: Row) -> list[Row]:
         ]
     splits = result.get("recordings", {}).get("rows", [])
     for (rig, key, what, unit, pair), joint in itertools.product(_REAL, (0, 1)):
-        errors = [row[key][joint] for row in splits if row["rig"].startswith(rig)]
+        names = [f"{row['rig']}, {row['held_out']}" for row in splits]
+        errors = [
+            row[key][joint] for row, n in zip(splits, names, strict=True) if n.startswith(rig)
+        ]
         if known := [error for error in errors if error is not None]:
             worst = max(known) * (1e3 if unit == "mrad" else 1.0)
-            name = f"{what}, {_JOINTS[rig][joint]}, worst split"
+            name = f"{what}, {_JOINTS.get(rig, JOINTS)[joint]}, worst split"
             found.append((name, pair[joint], unit, worst))
     if (arms := result.get("coverage")) is not None:
         share, longest = 100 * arms["share_inside"], arms["fit_longest_s"]

@@ -12,6 +12,8 @@ from hopping_leg.io import write_json
 from hopping_leg.robot import check_physics, load_robot, load_tree
 from tests.identify.fitting import TRUTH, identified, run
 
+CLOSED_LOOP = ("closed_loop_position_rms_rad", "closed_loop_torque_rms_nm")
+
 
 def test_the_result_says_what_it_was_made_from_how_it_was_judged_and_within_which_intervals():
     tree = as_json(identified())
@@ -24,12 +26,9 @@ def test_the_result_says_what_it_was_made_from_how_it_was_judged_and_within_whic
     assert one["history"][-1] == one["cost"]
     assert (one["other_starts"], tree["search"]["scoring"]["velocity"]) == ([], None)
     for part in (tree["validation"], tree["start_validation"]):
-        assert len(part["closed_loop_position_rms_rad"]) == 2
-        assert len(part["closed_loop_torque_rms_nm"]) == 2
+        assert {len(part[name]) for name in CLOSED_LOOP} == {2}
         horizons = part["open_loop_position_rms_rad"]
-        assert [(key, len(pair)) for key, pair in horizons.items()] == [
-            ("0.2", 2), ("0.5", 2), ("1.0", 2),
-        ]  # fmt: skip
+        assert {key: len(pair) for key, pair in horizons.items()} == {"0.2": 2, "0.5": 2, "1.0": 2}
     assert [row["name"] for row in tree["parameters"]] == list(TRUTH)
     for row in tree["parameters"]:
         assert row["bound_low"] <= row["value"] <= row["bound_high"]
@@ -67,17 +66,14 @@ def test_draws_have_the_intervals_quantiles_and_stay_within_what_is_possible():
 
 
 def test_what_does_not_exist_is_null_and_nobody_tells_of_it():
-    nothing = dict.fromkeys(
-        ("closed_loop_position_rms_rad", "closed_loop_torque_rms_nm"), (np.nan, np.nan)
-    )
+    nothing = dict.fromkeys(CLOSED_LOOP, (np.nan, np.nan))
     found, names = identified(), ("validation", "start_validation")
     known = {when: dataclasses.replace(getattr(found, when), **nothing) for when in names}
     certain = dataclasses.replace(found.identifiability, half_width=np.array([np.inf, 1.0]))
     tree = as_json(dataclasses.replace(found, **known, identifiability=certain))
     assert json.loads(json.dumps(tree, allow_nan=False)) == tree
     assert tree["parameters"][0]["interval_high"] is None
-    assert tree["validation"]["closed_loop_position_rms_rad"] == [None, None]
-    assert tree["validation"]["closed_loop_torque_rms_nm"] == [None, None]
+    assert all(tree["validation"][name] == [None, None] for name in CLOSED_LOOP)
     assert [row["error"] for row in tree["quality"]] == [
         f"position, predicted {horizon} s ahead" for horizon in ("0.2", "0.5", "1")
     ]
@@ -92,6 +88,7 @@ def test_every_identified_number_says_so_below_its_provenance_and_all_others_sta
     text = "".join(line for line in saved.open() if line.startswith("#"))
     for part in ("swing 0.0, 0.0-4.5 s", "seed 0", "mujoco", "least-squares", "closed loop, "):
         assert part in text
+    assert "AT A BOUND" not in text
     robot = load_robot(saved)
     assert (robot.name, robot.digest) == ("mine", identified().robot.digest)
     tree, before = load_tree(saved), load_tree("legv2")
@@ -116,9 +113,11 @@ def found_of(name, unit, value):
     return dataclasses.replace(found, identifiability=known, passes=(last,))
 
 
-def test_what_belongs_to_the_rig_stays_out_of_the_robot(tmp_path):
-    path = tmp_path / "mine.toml"
-    save_robot(found_of("drive.hip.stiffness", "N m/rad", 9.0), path, "legv2")
+def test_what_belongs_to_the_rig_stays_out_of_the_robot_and_a_bound_is_said_first(tmp_path):
+    path, found = tmp_path / "mine.toml", found_of("drive.hip.stiffness", "N m/rad", 9.0)
+    known = dataclasses.replace(found.identifiability, at_bound=[False, True])
+    save_robot(dataclasses.replace(found, identifiability=known), path, "legv2")
+    assert "AT A BOUND OF THE SEARCH: drive.hip.stiffness 9 N m/rad." in next(path.open())
     assert "drive" not in tomllib.loads(path.read_text())
     assert "#   drive.hip.stiffness = 9 N m/rad" in path.read_text()
 

@@ -99,8 +99,8 @@ def run(args: Identify) -> None:
             report=lambda stage, share, cost: bar.show(stage, share, f"cost {cost:.5g}"),
         )
     result.save_robot(identified, args.out, origin)
-    if warning := result.warning(identified):
-        say(warning)
+    warning = result.warning(identified)
+    say(*filter(None, (warning, result.at_bounds(identified))))
     show_table(result.PARAMETERS, result.shown_parameters(identified))
     show_table(result.ERRORS, result.shown_errors(identified))
     say(*identified.identifiability.statements)
@@ -109,8 +109,7 @@ def run(args: Identify) -> None:
     if args.report:
         from hopping_leg.identify.report import write_fit_report
 
-        page = write_fit_report(identified, COMMAND.get(), args.threads)
-        io.write_atomically(args.report, page)
+        io.write_atomically(args.report, write_fit_report(identified, COMMAND.get(), args.threads))
     say_written(args.out, args.json, args.report)
     if warning:
         raise errors.PhysicsError(warning)

@@ -31,8 +31,9 @@ class RobustLoss:
 
     groups: IntArray
     """Number of each residual's group, (size,)."""
-    level: float
-    """Mean squared residual beyond which a group counts ever less; ``IN_FULL`` counts all alike."""
+    level: float | Array
+    """Mean squared residual beyond which a group counts ever less, of all or (groups,);
+    ``IN_FULL`` counts all alike."""
 
     @cached_property
     def sizes(self) -> IntArray:
@@ -83,6 +84,8 @@ class Scoring:
     unexplained: float | None = None
     """Mean squared residual of a window, in one quantity of one joint, beyond which the
     window counts ever less, so that what no parameters explain hardly moves them."""
+    in_full: tuple[str, ...] = ()
+    """Quantities of which every window counts in full nevertheless."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +134,12 @@ class Objective:
     @cached_property
     def loss(self) -> RobustLoss:
         """What windows that no parameters explain are worth."""
-        return RobustLoss(self.groups, self.scoring.unexplained or IN_FULL)
+        level, whole = self.scoring.unexplained or IN_FULL, self.scoring.in_full
+        levels = [
+            np.full(len(mask) * mask[0, 0].size, IN_FULL if name in whole else level)
+            for name, (_, _, mask) in self._scored.items()
+        ]
+        return RobustLoss(self.groups, np.concatenate(levels)[: self.groups.max() + 1])
 
     @property
     def jumping(self) -> IntArray | None:

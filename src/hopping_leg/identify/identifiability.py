@@ -71,9 +71,8 @@ def identifiability(
     at_bound = ((vector - low <= near) | (high - vector <= near)).tolist()
     statements = _statements(parameters, values, half, correlation, at_bound)
     covariance = total * np.outer(wide, wide)
-    return Identifiability(
-        parameters.names, values, half, correlation, covariance, at_bound, statements
-    )
+    known = (values, half, correlation, covariance)
+    return Identifiability(parameters.names, *known, at_bound, statements)
 
 
 def correlation_time(residuals: Array) -> float:

@@ -234,8 +234,7 @@ def cma_es(
     spans = (1, len(judges), len(means) // 3 + 1)
     elected = np.array([winner, *bests[-_RECENT:], *(np.mean(means[-n:], axis=0) for n in spans)])
     final = values(elected)
-    least = float(final.min())
-    count = len(history) * options.population + len(elected)
+    least, count = float(final.min()), len(history) * options.population + len(elected)
     return Found(elected[final.argmin()], least, count, [*history, least])
 
 

@@ -28,6 +28,8 @@ class ActuatorParameters:
     integral: float = quantity("N m/(rad s)", math.nan)
     sensor_gain: float = quantity("1", 1.0)
     """Measured torque per true torque."""
+    torque_limit: float = quantity("N m", math.nan)
+    """Of what its own loop asks for, on this rig."""
 
 
 @dataclass(frozen=True)
@@ -103,8 +105,8 @@ _RANGES = {
     "drive.delay": (0.0, 0.02),
     "drive.creep": (0.0, 0.1),
     "drive.ramp": (0.0, 1.0),
-    "drive.stiffness": (0.0, 500.0),
-    "drive.damping": (0.0, 10.0),
+    "drive.stiffness": (0.0, 2000.0),
+    "drive.damping": (0.0, 50.0),
     "drive.integral": (0.0, 100.0),
     "torque_gain": (0.5, 1.5),
     "drive.sensor_gain": (0.5, 1.5),

@@ -66,27 +66,20 @@ def identify(
     if seed < 0 or options.threads < 0:
         raise UsageError("The seed and the number of threads must not be negative.")
     check_recordings([*recordings, *validate], robot)
-    plan = make_plan(
-        recordings,
-        robot,
-        parameters=options.parameters,
-        bounds=options.bounds,
-        search=options.search,
-    )
+    names, bounds, how = options.parameters, options.bounds, options.search
+    plan = make_plan(recordings, robot, parameters=names, bounds=bounds, search=how)
     fit, held, split = _split(recordings, validate, plan, seed)
     for recording in (*recordings, *validate):
         _check_conventions(recording, plan.start)
     windows = cut(fit, plan.window, unscored=plan.unscored)
     if not windows:
         raise RecordingError("No flight of the base was found; record hops that begin at rest.")
-    objective = Objective(
-        tuple(fit), tuple(windows), plan.parameters, plan.scoring, options.threads
-    )
+    scoring, threads = plan.scoring, options.threads
+    objective = Objective(tuple(fit), tuple(windows), plan.parameters, scoring, threads)
     passes = search(plan, objective, options.effort, seed=seed, report=report, ray=options.ray)
     report("finding intervals", 1.0, passes[-1].found.cost)
     hypothesis, known = _conclude(objective, passes[-1])
     report("judging", 1.0, passes[-1].found.cost)
-    threads = options.threads
     before, after = (validation.validate(held, h, threads) for h in (plan.start, hypothesis))
     rigs = dict.fromkeys(r.metadata.rig for r in held)
     groups = {rig: [r for r in held if r.metadata.rig == rig] for rig in rigs if len(rigs) > 1}

@@ -116,6 +116,8 @@ def make_plan(
     names = [name.removeprefix("+") for name in names]
     start = LegHypothesis(_without_reality(robot, names)).replace(_start(recordings, gains))
     for joint, name in zip(JOINTS, STIFFNESS, strict=True):
+        if (limit := f"drive.{joint}.torque_limit") in names:
+            start = start.replace({limit: getattr(robot, joint).torque_limit})
         if name in names and np.isnan(start.get(name)):
             start = start.replace({name: _USUAL * stiffest(robot, joint, COARSE_TIMESTEP)})
     limits = _bounds(recordings, robot) | dict(bounds or {})
@@ -220,6 +222,7 @@ def _bounds(recordings: Sequence[Recording], robot: Robot) -> dict[str, tuple[fl
         most = stiffest(robot, name, COARSE_TIMESTEP)
         found[f"reality.{name}.stiffness"] = (_SOFTEST * most, most)
         found[f"{name}.motor.peak_torque"] = (peak, 4 * motor.peak_torque)
+        found[f"drive.{name}.torque_limit"] = (0.0, motor.peak_torque * joint.belt_ratio)
         least = _REACHED * joint.belt_ratio * float(np.quantile(seen, _FASTEST)) if len(seen) else 0
         known = motor.no_load_speed
         found[f"{name}.motor.no_load_speed"] = (max(0.25 * known, min(least, known)), 4 * known)
@@ -246,7 +249,9 @@ def _scoring(recordings: Sequence[Recording], gains: list[str]) -> cost.Scoring:
         return cost.Scoring(position=0.02, robust=2.0, unexplained=0.4)
     torque = 0.2 if any(r.has("torque") for r in recordings) else None
     if torque is not None and gains:
-        return cost.Scoring(position=0.003, torque=0.5, robust=1.0, unexplained=0.4)
+        # Positions tell of a limit that holds for a whole recording, where torques are a riddle.
+        own = cost.Scoring(position=0.005, torque=0.5, robust=1.0, unexplained=0.4)
+        return replace(own, in_full=("position",))
     rails = [r for r in recordings if r.metadata.rig == "rail"]
     height = 0.002 if any(r.has_column("height_m") for r in rails) else None
     return cost.Scoring(position=0.005, torque=torque, height=height, robust=3.0, unexplained=0.4)

@@ -178,6 +178,13 @@ def warning(identified: Identified) -> str:
     )
 
 
+def at_bounds(identified: Identified) -> str:
+    """Return a sentence that names the values that a bound of the search held, if any, else ""."""
+    rows = (row for row in parameters_json(identified) if row["at_bound"])
+    held = ", ".join(f"{row['name']} {row['value']:.4g} {row['unit']}" for row in rows)
+    return f"AT A BOUND OF THE SEARCH: {held}. Widen it (--bounds) or leave it out." if held else ""
+
+
 def parameters_json(identified: Identified) -> list[dict[str, Any]]:
     """Return a record per parameter: value, 95 % interval, start and bounds, SI.
 
@@ -303,6 +310,7 @@ def _comment(identified: Identified, origin: str) -> str:
     drives = [r for r in numbers if r["name"].startswith("drive.")]
     lines = [
         warning(identified),
+        at_bounds(identified),
         f"Identified by `hop identify` from {origin}; numbers without 'identified' are its.",
         *provenance(identified),
         *(", ".join(row) for row in (ERRORS, *shown_errors(identified))),

@@ -191,6 +191,8 @@ class _WindowGroup:
             for stop, extreme in (("lower", np.fmin), ("upper", np.fmax)):
                 most = extreme.reduce(seen, axis=1)
                 table[f"stop_{stop}"][:, n] = extreme(table[f"stop_{stop}"][:, n], most)
+        limits = _drive_values(hypotheses, "torque_limit")[:, None]
+        table["torque_limit"] = np.where(np.isnan(limits), table["torque_limit"], limits)
         return table
 
     def _drives(self, hypotheses: Sequence[parameters.LegHypothesis]) -> Records:
