@@ -22,19 +22,20 @@ ARM_SECONDS = 12.0
 PAPER_METHODS = ("least-squares", "two-pass")
 """Searches on recordings of the paper's size."""
 
-_SLOW, _FAST = (f"{HALVES['leg V2, fixed base']}, dcr1_seg{n}" for n in (0, 4))
+_HALF = [f"{HALVES}, dcr1_seg{n}" for n in (0, 2, 4)]
+_POSITION, _TORQUE = "closed_loop_position_rms_rad", "closed_loop_torque_rms_nm"
 _REAL = (
     ("double", "predicted_0_2_s_rms_rad", "double pendulum, 0.2 s ahead", "mrad", (12.0, 29.0)),
     ("double", "predicted_0_5_s_rms_rad", "double pendulum, 0.5 s ahead", "mrad", (33.0, 95.0)),
-    ("leg V2", "closed_loop_position_rms_rad", "leg V2, position", "mrad", (25.0, 3.0)),
-    ("leg V2", "closed_loop_torque_rms_nm", "leg V2, torque", "N m", (0.14, 0.4)),
-    (_SLOW, "closed_loop_position_rms_rad", "leg V2, slow halves, position", "mrad", (25.0, 3.0)),
-    (_SLOW, "closed_loop_torque_rms_nm", "leg V2, slow halves, torque", "N m", (0.14, 0.4)),
-    (_FAST, "closed_loop_position_rms_rad", "leg V2, fast halves, position", "mrad", (25.0, 15.0)),
+    ("leg V2", _POSITION, "leg V2, position", "mrad", (25.0, 3.0)),
+    ("leg V2", _TORQUE, "leg V2, torque", "N m", (0.14, 0.4)),
+    (_HALF[0], _POSITION, "leg V2, slow halves, position", "mrad", (25.0, 3.0)),
+    (_HALF[0], _TORQUE, "leg V2, slow halves, torque", "N m", (0.14, 0.4)),
+    (_HALF[1], _POSITION, "leg V2, ringing halves, position", "mrad", (25.0, 3.0)),
+    (_HALF[1], _TORQUE, "leg V2, ringing halves, torque", "N m", (0.14, 0.4)),
+    (_HALF[2], _POSITION, "leg V2, fast halves, position", "mrad", (25.0, 15.0)),
 )
 """Bars of real recordings: beginning of rig and recording, number, in words, unit, hip and knee."""
-
-_JOINTS = {"double": ("joint 1", "joint 2")}
 
 
 def bars(result: Row) -> list[Row]:
@@ -57,13 +58,11 @@ def bars(result: Row) -> list[Row]:
         ]
     splits = result.get("recordings", {}).get("rows", [])
     for (rig, key, what, unit, pair), joint in itertools.product(_REAL, (0, 1)):
-        names = [f"{row['rig']}, {row['held_out']}" for row in splits]
-        errors = [
-            row[key][joint] for row, n in zip(splits, names, strict=True) if n.startswith(rig)
-        ]
-        if known := [error for error in errors if error is not None]:
+        own = [row for row in splits if f"{row['rig']}, {row['held_out']}".startswith(rig)]
+        if known := [row[key][joint] for row in own if row[key][joint] is not None]:
             worst = max(known) * (1e3 if unit == "mrad" else 1.0)
-            name = f"{what}, {_JOINTS.get(rig, JOINTS)[joint]}, worst split"
+            joints = ("joint 1", "joint 2") if rig == "double" else JOINTS
+            name = f"{what}, {joints[joint]}, worst split"
             found.append((name, pair[joint], unit, worst))
     if (arms := result.get("coverage")) is not None:
         share, longest = 100 * arms["share_inside"], arms["fit_longest_s"]
@@ -82,9 +81,6 @@ def bars(result: Row) -> list[Row]:
         }
         for what, bar, unit, value in found
     ]
-
-
-_VARIABLE = "HOPPING_LEG_RECORDINGS"
 
 
 @dataclass(frozen=True)
@@ -106,7 +102,7 @@ class Identify(Study):
         There is an entry per part, and ``bars``: what was to be reached and what was.
         """
         self._check()
-        folder = self.recordings or os.environ.get(_VARIABLE)
+        folder = self.recordings or os.environ.get("HOPPING_LEG_RECORDINGS")
         sizes = {f.name: getattr(self, f.name) for f in fields(Study) if f.name != "out"}
         result: Row = {"study": sizes, "host": host()}
         if "synthetic" in self.parts:

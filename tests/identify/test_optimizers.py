@@ -65,11 +65,10 @@ def test_a_recording_that_the_model_cannot_explain_hardly_moves_the_estimate():
     run = record(weak, swing(2.0, phase=1.0))
 
     def errors(scoring, recordings, **more):
-        truth = TRUTH | more
-        parameters = choose(CAD.replace(dict.fromkeys(more, 1.0)), list(truth))
+        parameters = choose(CAD.replace(dict.fromkeys(more, 1.0)), [*TRUTH, *more])
         goal = objective(parameters, scoring, recordings)
         found = least_squares(goal.residuals, parameters, goal.loss)
-        return np.abs(parameters.values(found.vector) / list(truth.values()) - 1)
+        return np.abs(parameters.values(found.vector) / [*(TRUTH | more).values()] - 1)
 
     assert errors(SCORING, [RUN, run]).max() > 0.5
     assert errors(dataclasses.replace(SCORING, unexplained=1.0), [RUN, run]).max() < 0.02

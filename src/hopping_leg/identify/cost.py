@@ -32,8 +32,7 @@ class RobustLoss:
     groups: IntArray
     """Number of each residual's group, (size,)."""
     level: float | Array
-    """Mean squared residual beyond which a group counts ever less, of all or (groups,);
-    ``IN_FULL`` counts all alike."""
+    """Mean squared residual beyond which a group counts ever less, (groups,); ``IN_FULL``: none."""
 
     @cached_property
     def sizes(self) -> IntArray:
@@ -135,11 +134,9 @@ class Objective:
     def loss(self) -> RobustLoss:
         """What windows that no parameters explain are worth."""
         level, whole = self.scoring.unexplained or IN_FULL, self.scoring.in_full
-        levels = [
-            np.full(len(mask) * mask[0, 0].size, IN_FULL if name in whole else level)
-            for name, (_, _, mask) in self._scored.items()
-        ]
-        return RobustLoss(self.groups, np.concatenate(levels)[: self.groups.max() + 1])
+        counts = [len(mask) * mask[0, 0].size for _, _, mask in self._scored.values()]
+        levels = np.repeat([IN_FULL if q in whole else level for q in self._scored], counts)
+        return RobustLoss(self.groups, levels[: self.groups.max() + 1])
 
     @property
     def jumping(self) -> IntArray | None:
@@ -155,10 +152,8 @@ class Objective:
             for name, (scale, values, mask) in self._scored.items()
         ]
         joined = np.ascontiguousarray(np.concatenate(parts, axis=1))
-        finite = np.nan_to_num(joined, nan=_FAILED, posinf=_FAILED)
-        raw: Array = np.clip(finite, -_FAILED, _FAILED)
-        bound = self.scoring.robust
-        if bound is None:
+        raw: Array = np.clip(np.nan_to_num(joined, nan=_FAILED), -_FAILED, _FAILED)
+        if (bound := self.scoring.robust) is None:
             return raw
         squares = 2 * bound**2 * (np.sqrt(1 + np.square(raw / bound)) - 1)
         return np.asarray(np.copysign(np.sqrt(squares), raw))

@@ -250,8 +250,7 @@ def _scoring(recordings: Sequence[Recording], gains: list[str]) -> cost.Scoring:
     torque = 0.2 if any(r.has("torque") for r in recordings) else None
     if torque is not None and gains:
         # Positions tell of a limit that holds for a whole recording, where torques are a riddle.
-        own = cost.Scoring(position=0.005, torque=0.5, robust=1.0, unexplained=0.4)
-        return replace(own, in_full=("position",))
+        return cost.Scoring(0.005, torque=0.5, robust=1.0, unexplained=0.4, in_full=("position",))
     rails = [r for r in recordings if r.metadata.rig == "rail"]
     height = 0.002 if any(r.has_column("height_m") for r in rails) else None
     return cost.Scoring(position=0.005, torque=torque, height=height, robust=3.0, unexplained=0.4)

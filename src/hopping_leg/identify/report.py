@@ -66,9 +66,8 @@ def _subtitle(identified: Identified) -> str:
     rigs = ", ".join(dict.fromkeys(r.metadata.rig for r in (*identified.fit, *identified.held)))
     fit, held = (sum(r.duration for r in part) for part in (identified.fit, identified.held))
     return (
-        f"{result.warning(identified)} {result.at_bounds(identified)} {identified.start.robot.name}"
-        f" on {rigs}; {fit:.0f} s fitted, {held:.0f} s held out to judge ({identified.split});"
-        f" search: {identified.plan.search}"
+        f"{result.warning(identified)} {identified.start.robot.name} on {rigs}; {fit:.0f} s fitted,"
+        f" {held:.0f} s held out to judge ({identified.split}); search: {identified.plan.search}"
     ).strip()
 
 
