@@ -17,6 +17,7 @@ _NINETY_FIVE = 1.959963984540054
 _UNTOLD = 0.5  # an interval wider than this share of value or scale, to either side, tells little
 _TIED = 0.95  # correlation beyond which only a combination of two parameters is known
 _SINGULAR = 1e-10
+_NEAR = 0.01  # scales, or of a narrower range its share, from a bound that holds a value
 
 
 @dataclass(frozen=True)
@@ -65,9 +66,8 @@ def identifiability(
     unit = parameters.scale_at(vector)
     wide = half / _NINETY_FIVE / np.sqrt(np.maximum(np.diag(total), 1e-300)) * unit
     half = np.where(blind, np.inf, half * unit)
-    values = parameters.values(vector)
-    low, high = parameters.bounds
-    near = 1e-6 * (high - low)
+    values, (low, high) = parameters.values(vector), parameters.bounds
+    near = _NEAR * np.minimum(high - low, 1.0)
     at_bound = ((vector - low <= near) | (high - vector <= near)).tolist()
     statements = _statements(parameters, values, half, correlation, at_bound)
     covariance = total * np.outer(wide, wide)
