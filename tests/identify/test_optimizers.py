@@ -71,7 +71,10 @@ def test_a_recording_that_the_model_cannot_explain_hardly_moves_the_estimate():
         return np.abs(parameters.values(found.vector) / [*(TRUTH | more).values()] - 1)
 
     assert errors(SCORING, [RUN, run]).max() > 0.5
-    assert errors(dataclasses.replace(SCORING, unexplained=1.0), [RUN, run]).max() < 0.02
+    robust = dataclasses.replace(SCORING, unexplained=1.0)
+    assert errors(robust, [RUN, run]).max() < 0.02
+    whole = dataclasses.replace(robust, in_full=("torque",))
+    assert errors(whole, [RUN, run]).max() > 0.1
     limit = {"drive.knee.torque_limit": weak.knee.torque_limit}  # which explains it
     assert errors(SCORING, [run], **limit).max() < 0.02
 

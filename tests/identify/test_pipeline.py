@@ -177,6 +177,7 @@ def test_a_plan_has_short_windows_where_nothing_holds_the_leg_and_begins_at_doub
     assert make_plan([FIXED, STANDING], LEG).window <= 0.25
     doubtful = make_plan([FIXED.with_metadata(gains_exact=False)], LEG)
     assert doubtful.start.get("drive.knee.stiffness") == FIXED.metadata.stiffness[1]
+    assert doubtful.scoring.in_full == ("position",)
     papers = make_plan([FIXED, STANDING], LEG, search="two-pass")
     assert (papers.scoring.torque, papers.scoring.robust) == (None, None)
     assert "thigh.inertia" in papers.parameters.names
