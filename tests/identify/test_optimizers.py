@@ -73,7 +73,7 @@ def test_a_recording_that_the_model_cannot_explain_hardly_moves_the_estimate():
     assert errors(SCORING, [RUN, run]).max() > 0.5
     robust = dataclasses.replace(SCORING, unexplained=1.0)
     assert errors(robust, [RUN, run]).max() < 0.02
-    whole = dataclasses.replace(robust, in_full=("torque",))
+    whole = dataclasses.replace(robust, in_full=("position",))
     assert errors(whole, [RUN, run]).max() > 0.1
     limit = {"drive.knee.torque_limit": weak.knee.torque_limit}  # which explains it
     assert errors(SCORING, [run], **limit).max() < 0.02
