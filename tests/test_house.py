@@ -24,7 +24,7 @@ CEILINGS = {
     "tests/**/*.py": (136, 13900),
     "studies/**/*.py": (74, 7920),
     "docs/**/*.md": (22, 2520),
-    "docs/live/*.js": (13, 1480),
+    "docs/live/*.js": (13, 1490),
 }
 """Files and lines at most. Who raises one says what users gain by it."""
 

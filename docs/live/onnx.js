@@ -63,7 +63,14 @@ function readNode(bytes) {
     throw new PageError(`Its operator ${operator} is none of those that this page evaluates: ${
       Object.keys(OPERATORS).join(", ")}.`);
   }
-  return { operator, inputs: texts(found[1]), outputs: texts(found[2]) };
+  const attributes = Object.fromEntries((found[5] ?? []).map(readAttribute));
+  return { operator, attributes, inputs: texts(found[1]), outputs: texts(found[2]) };
+}
+
+// AttributeProto: name, and a tensor or a whole number.
+function readAttribute(bytes) {
+  const { 1: name, 3: number, 5: tensor } = message(bytes);
+  return [texts(name)[0], tensor ? readTensor(tensor[0])[1] : number?.[0]];
 }
 
 // ValueInfoProto: name, and how many values a row has.
@@ -98,7 +105,8 @@ export function runOnnx({ nodes, weights, outputs }, inputs) {
   const values = new Map(weights);
   for (const [name, value] of Object.entries(inputs)) values.set(name, value);
   for (const node of nodes) {
-    const results = OPERATORS[node.operator](...node.inputs.map((name) => values.get(name)));
+    const given = node.inputs.map((name) => values.get(name));
+    const results = OPERATORS[node.operator].apply(node.attributes, given);
     node.outputs.forEach((name, i) => values.set(name, results[i]));
   }
   return Object.fromEntries(outputs.map((name) => [name, values.get(name)]));
@@ -106,6 +114,9 @@ export function runOnnx({ nodes, weights, outputs }, inputs) {
 
 // An operator on every pair of values, of which one side may be a single one.
 const paired = (apply) => (a, b) => {
+  if (a.length !== b.length && a.length !== 1 && b.length !== 1) {
+    throw new PageError("It has tensors of more axes than this page evaluates.");
+  }
   const result = new Float32Array(Math.max(a.length, b.length));
   for (let i = 0; i < result.length; i++) {
     result[i] = apply(a[a.length === 1 ? 0 : i], b[b.length === 1 ? 0 : i]);
@@ -123,12 +134,13 @@ const each = (apply) => (a) => [a.map(apply)];
 const same = (a) => [a];
 const sigmoid = (x) => 1 / (1 + Math.exp(-x));
 
-// x W + b for W (in, out), summed in double precision.
-function gemm(x, weight, bias) {
+// x W + b for W (in, out), or (out, in) if it is transposed, summed in double precision.
+function gemm(x, weight, bias, transposed) {
   const count = weight.length / x.length;
+  const [row, column] = transposed ? [1, x.length] : [count, 1];
   const sums = bias ? Float64Array.from(bias) : new Float64Array(count);
   for (let j = 0; j < x.length; j++) {
-    for (let i = 0; i < count; i++) sums[i] += x[j] * weight[j * count + i];
+    for (let i = 0; i < count; i++) sums[i] += x[j] * weight[j * row + i * column];
   }
   return [Float32Array.from(sums)];
 }
@@ -157,11 +169,13 @@ function gru(x, ofInput, ofMemory, bias, _lengths, memory) {
 const OPERATORS = {
   Add: paired((a, b) => a + b),
   Clip: (a, [least], [most]) => [a.map((x) => clamp(x, least, most))],
+  Constant() { return [this.value]; },
   Concat: (...parts) => [Float32Array.from(parts.flatMap((part) => [...part]))],
   Elu: each((x) => (x > 0 ? x : Math.expm1(x))),
   Flatten: same,
   GRU: gru,
-  Gemm: gemm,
+  Gather: (a, places) => [Float32Array.from(places, (place) => a[place])],
+  Gemm(x, weight, bias) { return gemm(x, weight, bias, this.transB); },
   MatMul: (x, weight) => gemm(x, weight),
   Mul: paired((a, b) => a * b),
   Relu: each((x) => Math.max(x, 0)),
