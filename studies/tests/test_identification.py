@@ -30,7 +30,10 @@ def test_errors_are_relative_to_the_truth_and_claims_are_counted():
 def test_bars_know_which_side_is_better():
     errors = (([0.010, 0.030], [0.020, None]), ([0.011, 0.020], [0.034, None]))
     names = ("predicted_0_2_s_rms_rad", "predicted_0_5_s_rms_rad")
-    rows = [{"rig": "double pendulum"} | dict(zip(names, row, strict=True)) for row in errors]
+    rows = [
+        {"rig": "double pendulum", "held_out": "b"} | dict(zip(names, row, strict=True))
+        for row in errors
+    ]
     arms = {"share_inside": 0.95, "fit_longest_s": 12.0}
     found = bars({"coverage": arms, "recordings": {"rows": rows}})
     assert [row["reached"] for row in found] == [True, False, False, True, False]
