@@ -67,6 +67,23 @@ def test_spikes_are_left_out_and_nothing_else(rows, length, size, side):
 
 
 @settings(max_examples=15)
+@given(
+    bits=st.sampled_from([16, 24, 31, 32]),
+    unit=st.sampled_from([1e-6, 1e-3]),
+    start=st.floats(0.1, 2.9),
+    jitter=st.floats(0, 3e-4),
+)
+def test_a_counter_that_wraps_goes_on(bits, unit, start, jitter):
+    period = 2**bits * unit
+    rng = np.random.default_rng(0)
+    true = (1 + 3 // period) * period - start + np.arange(600) / 200 + jitter * rng.random(600)
+    recording = clocked(true % period)
+    (warning,) = recording.warnings
+    assert "began anew" in warning
+    np.testing.assert_allclose(recording.time - recording.time[0], true - true[0], atol=1e-9)
+
+
+@settings(max_examples=15)
 @given(tick=st.floats(0.31, 6.0), rate=st.sampled_from([100.0, 200.0, 500.0]))
 def test_a_coarse_clock_is_refused_unless_it_counts_in_periods(tick, rate):
     if abs(1 / tick - round(1 / tick)) < 0.02:

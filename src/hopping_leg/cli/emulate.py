@@ -73,12 +73,11 @@ def run(args: Emulate) -> None:
     at_least(0, seed=args.seed)
     from hopping_leg.emulator.server import EmulatorConfig, Server
 
-    names = ("robot", "configured", "homed", "held", "seed", "link")
     start = EmulatorConfig(
-        pose=",".join(args.start_pose),
+        robot=args.robot, pose=",".join(args.start_pose), configured=args.configured,
+        homed=args.homed, held=args.held, seed=args.seed, link=args.link,
         faults=() if args.faults is None else load_faults(args.faults),
-        **{name: getattr(args, name) for name in names},
-    )
+    )  # fmt: skip
     robot, port = start.build(), start.open()
     seconds = math.inf if args.seconds is None else args.seconds
     with contextlib.closing(port), contextlib.suppress(KeyboardInterrupt):

@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -56,9 +55,10 @@ class EmulatorConfig:
         """
         robot = load_robot(self.robot)
         robot.require_leg()
-        names = ("configured", "homed", "held", "seed", "faults")
-        start: dict[str, Any] = {name: getattr(self, name) for name in names}
-        return EmulatedRobot(robot, posture(robot, self.pose), **start)
+        return EmulatedRobot(
+            robot, posture(robot, self.pose), configured=self.configured, homed=self.homed,
+            held=self.held, seed=self.seed, faults=self.faults,
+        )  # fmt: skip
 
     def open(self) -> PtyPort:
         """Return the adapter; UsageError where the link is another emulator's, or no link."""

@@ -4,7 +4,7 @@ from hopping_leg.envs.apex_reward import ApexRewardConfig, apex_reward
 from hopping_leg.envs.gymnasium_envs import HoppingEnv, HoppingVectorEnv
 from hopping_leg.envs.paper_reward import PaperRewardConfig, paper_reward
 from hopping_leg.envs.rewards import LastingTerm, Reward, RewardTerm, Transition
-from hopping_leg.envs.task import HoppingTask, Step, TaskLeg
+from hopping_leg.envs.task import HoppingTask, TaskLeg
 from hopping_leg.envs.task_config import TaskConfig
 
 __all__ = [
@@ -16,7 +16,6 @@ __all__ = [
     "PaperRewardConfig",
     "Reward",
     "RewardTerm",
-    "Step",
     "TaskConfig",
     "TaskLeg",
     "Transition",

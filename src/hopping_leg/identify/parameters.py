@@ -246,7 +246,8 @@ def _simulable(base: LegHypothesis, values: Mapping[str, float]) -> LegHypothesi
 
 
 def _widest_bounds(name: str, value: float) -> tuple[float, float]:
-    short = "drive." * name.startswith("drive.") + name.rsplit(".", 1)[-1]
+    last = name.rsplit(".", 1)[-1]
+    short = f"drive.{last}" if name.startswith("drive.") else last
     known = _RANGES.get(name) or _RANGES.get(short)
     low, high = known or sorted((value / _FACTOR, value * _FACTOR))
     return min(low, value), max(high, value)

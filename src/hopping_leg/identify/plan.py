@@ -249,7 +249,7 @@ def _scoring(recordings: Sequence[Recording], gains: list[str]) -> cost.Scoring:
         return cost.Scoring(position=0.02, robust=2.0, unexplained=0.4)
     torque = 0.2 if any(r.has("torque") for r in recordings) else None
     if torque is not None and gains:
-        # Positions tell of a limit that holds for a whole recording, where torques are a riddle.
+        # Torques that no model explains must not leave out windows whose positions tell of a limit.
         return cost.Scoring(0.005, torque=0.5, robust=1.0, unexplained=0.4, in_full=("position",))
     rails = [r for r in recordings if r.metadata.rig == "rail"]
     height = 0.002 if any(r.has_column("height_m") for r in rails) else None

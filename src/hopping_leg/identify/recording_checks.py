@@ -90,6 +90,9 @@ def check_table(inspection: Inspection) -> None:
 
 _STALL = 2.0  # periods between rows from which on rows are missing
 _SPARSEST = 20.0  # periods per row beyond which the rate or the time's unit must be wrong
+# Where counters of nanoseconds to seconds begin anew, and the time of day, s
+_COUNTERS = [2.0**bits * 10.0**-n for bits in (16, 24, 31, 32) for n in (9, 6, 3, 0)] + [86400.0]
+_SOON = 5.0  # usual steps within which a wrapped clock goes on
 _ALIKE = 0.01  # periods within which two steps are one
 _COARSE = 0.3  # periods that a clock's tick may last
 
@@ -106,6 +109,7 @@ def _check_clock(inspection: Inspection) -> None:
     time = inspection.floats("time_s")
     if len(bad := np.flatnonzero(~np.isfinite(time))):
         inspection.refuse(f"column 'time_s' has no time in row {inspection.row(bad[0])}")
+    _unwrap_time(inspection, time)
     steps, metadata = np.diff(time), inspection.metadata
     if not len(steps):
         return
@@ -119,7 +123,7 @@ def _check_clock(inspection: Inspection) -> None:
         before, after = time[back[0] : back[0] + 2]
         inspection.refuse(
             f"column 'time_s' does not increase in row {inspection.row(back[0] + 1)}:"
-            f" {after:.9g} s comes after {before:.9g} s; let the clock go on, or split the file"
+            f" {after:.9g} s comes after {before:.9g} s; split the file there"
         )
     step = float(np.median(steps))
     if not 0.5 <= step * metadata.rate_hz <= _SPARSEST:
@@ -127,6 +131,19 @@ def _check_clock(inspection: Inspection) -> None:
             f"column 'time_s' steps by {step:.3g} from row to row but the metadata's rate_hz ="
             f" {metadata.rate_hz:g} means {metadata.period:.3g} s; one of the two is wrong"
         )
+
+
+def _unwrap_time(inspection: Inspection, time: Array) -> None:
+    """Let time, (ticks,), go on where its counter began anew."""
+    steps = np.diff(time)
+    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    wraps = 0
+    for index in np.flatnonzero(steps < 0).tolist():
+        turn = next((c for c in _COUNTERS if 0 < steps[index] + c < _SOON * usual), 0.0)
+        time[index + 1 :] += turn
+        wraps += turn > 0
+    if wraps:
+        inspection.mend("time_s", time, f"began anew {wraps} times; it was made to go on")
 
 
 @np.errstate(over="ignore", invalid="ignore")

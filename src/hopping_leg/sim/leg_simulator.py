@@ -65,8 +65,7 @@ class LegSimulator:
         self.height, self.height_rate = self.state[:, 0], self.state[:, 3]
         self.q, self.qd = self.state[:, 1:3], self.state[:, 4:6]
         self.records: Records = np.zeros(count, stepper.MEMORY)
-        """What each leg remembers besides its state, live, (n,) of ``MEMORY``; its ``LOADS``, (n,
-        8), are what the last control period was for the motors."""
+        """What each leg remembers besides its state, live, (n,) of ``MEMORY``."""
         self._push = np.zeros(count)
         self.command = np.zeros((count, stepper.COMMAND))
         """What drives are commanded beside the torques that ``step`` takes, live."""

@@ -484,17 +484,3 @@ def rounded(values: Array, step: Array) -> Array:
     """Return values rounded to steps, zero for none."""
     safe = np.where(step > 0, step, 1.0)
     return np.where(step > 0, np.round(values / safe) * safe, values)
-
-
-@compiled
-def motor_torques(table: Records, torque: Array, qd: Array, given: Array, friction: Array) -> None:
-    """Set what motors give, and the joints' dry friction, for one physics step of rigid legs.
-
-    Torques asked for and ``given`` before are in N m, speeds in rad/s, all (n, 2).
-    """
-    for k in range(len(table)):
-        p = table[k]
-        for joint in range(2):
-            motor, _ = motor_torque(p, joint, torque[k, joint], given[k, joint], qd[k, joint])
-            given[k, joint] = motor
-            friction[k, joint] = dry_friction(p, joint, motor, qd[k, joint])
