@@ -205,7 +205,7 @@ def _simulated(
             played = play(
                 excitation, robot, believed=believed, seed=args.seed + number, gains=gains,
                 timestep=args.timestep,
-                on_tick=lambda done, ticks, stem=stem: bar.show(stem, done / ticks),
+                on_tick=lambda done, ticks: bar.show(stem, done / ticks),  # noqa: B023
             )  # fmt: skip
             yield stem, played
 
