@@ -52,8 +52,7 @@ class Hops:
 
 def at_apex(rose: BoolArray, rises: BoolArray, clearance: Array) -> BoolArray:
     """Return where a leg in flight that rose a tick ago rises no more, (...)."""
-    apex: BoolArray = (rose > rises) & (clearance >= FLIGHT_CLEARANCE)
-    return apex
+    return (rose > rises) & (clearance >= FLIGHT_CLEARANCE)
 
 
 def find_hops(height: Array, velocity: Array, clearance: Array) -> Hops:
@@ -98,8 +97,7 @@ def find_bounces(height: Array, clearance: Array) -> IntArray:
     from scipy.signal import find_peaks  # takes a second, which no other part of the package needs
 
     peaks, _ = find_peaks(height, prominence=BOUNCE)
-    grounded: IntArray = peaks[clearance[peaks] < FLIGHT_CLEARANCE]
-    return grounded
+    return peaks[clearance[peaks] < FLIGHT_CLEARANCE]
 
 
 def count_skipped(

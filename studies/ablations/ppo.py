@@ -49,11 +49,11 @@ class _Split(nn.Module):
 
     def forward_actor(self, seen: torch.Tensor) -> torch.Tensor:
         """Return the actor's last hidden layer."""
-        return self.policy_net(seen[:, : self._actor])  # type: ignore[no-any-return]
+        return self.policy_net(seen[:, : self._actor])
 
     def forward_critic(self, seen: torch.Tensor) -> torch.Tensor:
         """Return the critic's last hidden layer."""
-        return self.value_net(seen[:, self._actor :])  # type: ignore[no-any-return]
+        return self.value_net(seen[:, self._actor :])
 
 
 class _Policy(ActorCriticPolicy):  # type: ignore[misc]

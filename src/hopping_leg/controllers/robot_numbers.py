@@ -46,8 +46,7 @@ def leg_length(robot: Robot) -> float:
 
 def full_torque(robot: Robot) -> Array:
     """Return the joint torques of a full action, N m, (2,): multiples of the weight times L."""
-    torque: Array = FULL_TORQUE * robot.mass * GRAVITY * leg_length(robot)
-    return torque
+    return FULL_TORQUE * robot.mass * GRAVITY * leg_length(robot)
 
 
 def fall_time(robot: Robot) -> float:
@@ -98,5 +97,4 @@ def robot_numbers(robot: Robot) -> Array:
         ]
     )
     middle, spread = MIDDLES_AND_SPREADS.T
-    numbers: Array = np.clip((values - middle) / spread, -MOST, MOST)
-    return numbers
+    return np.clip((values - middle) / spread, -MOST, MOST)

@@ -94,8 +94,7 @@ def upward_force(robot: Robot, q: Array, torque: Array) -> Array:
     weight = dynamics.gravity_force(robot, q)
     transposed = np.swapaxes(kinematics.jacobian(robot, q), -1, -2)
     force = np.linalg.solve(transposed, (weight[..., 1:] - torque)[..., None])[..., 0]
-    upward: Array = -force[..., 0] / weight[..., 0]
-    return upward
+    return -force[..., 0] / weight[..., 0]
 
 
 @dataclass
@@ -132,8 +131,7 @@ class Squat:
         lever = hip_lever / knee_lever if abs(hip_lever) < abs(knee_lever) else 0.0
         torque: Array = np.array([gravity[0] + lever * (knee - gravity[1]), knee])
         self._samples.append((float(share), q.copy(), torque))
-        friction: Array = _moving(share) * self._friction
-        return torque + friction
+        return torque + _moving(share) * self._friction
 
     def findings(self) -> SquatFindings:
         """Return what the squat looked like."""
@@ -143,11 +141,9 @@ class Squat:
 
 def _bent(share: Array) -> Array:
     """Return how far the knee is bent, 0 to 1, at a share of the squat's time."""
-    bent: Array = (1 - np.cos(2 * math.pi * share)) / 2
-    return bent
+    return (1 - np.cos(2 * math.pi * share)) / 2
 
 
 def _moving(share: Array) -> Array:
     """Return how fast the knee bends, over the fastest, at a share of the squat's time."""
-    moving: Array = np.sin(2 * math.pi * share)
-    return moving
+    return np.sin(2 * math.pi * share)

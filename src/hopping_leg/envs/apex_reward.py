@@ -70,15 +70,13 @@ def apex_reward(robot: Robot, config: ApexRewardConfig, rate: float) -> Reward:
         most: float | Array = _FASTEST_SQUARED
         if c.energy_beyond > 0:
             most = most * np.exp(-np.maximum(ballistic_apex(t) - t.command, 0.0) / c.energy_beyond)
-        gain: Array = np.minimum(np.square(t.rate), most)
-        return gain
+        return np.minimum(np.square(t.rate), most)
 
     def ground_closeness(t: Transition) -> Array:
         base = kinematics.base_clearance(robot, t.height)
         knee = kinematics.knee_clearance(robot, t.height, t.q)
         inside = np.maximum(1 - base / _BASE_MARGIN, 0.0) + np.maximum(1 - knee / _KNEE_MARGIN, 0.0)
-        closeness: Array = inside + TOUCH * (np.minimum(base, knee) < _TOUCH_MARGIN)
-        return closeness
+        return inside + TOUCH * (np.minimum(base, knee) < _TOUCH_MARGIN)
 
     return Reward(
         (

@@ -70,8 +70,7 @@ class _TaskView:
         data.qpos[0], data.qpos[1:] = legs.height[leg], legs.q[leg]
         mujoco.mj_forward(renderer.model, data)
         renderer.update_scene(data, camera="side")
-        image: Image = renderer.render()
-        return image
+        return renderer.render()
 
     def _close_stage(self) -> None:
         if "_stage" in vars(self):

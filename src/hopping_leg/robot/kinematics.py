@@ -90,15 +90,13 @@ def jacobian(robot: Geometry, q: Array) -> Array:
 
 def foot_velocity(robot: Geometry, q: Array, qd: Array) -> Array:
     """Return the foot's velocity in the hip's frame, (x_down, y) rates, m/s, (..., 2)."""
-    velocity: Array = np.einsum("...ij,...j->...i", jacobian(robot, q), qd)
-    return velocity
+    return np.einsum("...ij,...j->...i", jacobian(robot, q), qd)
 
 
 def stance_height(robot: Geometry, q: Array) -> Array:
     """Return the base height if the foot stands on flat, hard ground, m, (...)."""
     lengths = np.stack([robot.thigh.length, robot.shank.length], axis=-1)
-    height: Array = np.vecdot(np.cos(np.add.accumulate(q, axis=-1)), lengths) + robot.foot.radius
-    return height
+    return np.vecdot(np.cos(np.add.accumulate(q, axis=-1)), lengths) + robot.foot.radius
 
 
 def foot_clearance(robot: Geometry, height: Array, q: Array) -> Array:
@@ -119,12 +117,10 @@ def base_clearance(robot: Geometry, height: Array) -> Array:
 def smooth_step(share: Array) -> Array:
     """Return the path of least jerk from 0 to 1, at rest at both ends, (...)."""
     s = np.clip(share, 0.0, 1.0)
-    path: Array = s**3 * (10 - 15 * s + 6 * s**2)
-    return path
+    return s**3 * (10 - 15 * s + 6 * s**2)
 
 
 def smooth_step_rate(share: Array) -> Array:
     """Return the derivative of ``smooth_step``, (...)."""
     s = np.clip(share, 0.0, 1.0)
-    rate: Array = 30 * s**2 * (1 - s) ** 2
-    return rate
+    return 30 * s**2 * (1 - s) ** 2

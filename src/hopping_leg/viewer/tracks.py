@@ -57,13 +57,11 @@ class Track:
     @property
     def time(self) -> Array:
         """Time of each row, s, (rows,)."""
-        time: Array = self._rows[0]
-        return time
+        return self._rows[0]
 
     def field(self, name: str) -> Array:
         """Return one of ``FIELDS``, (rows,)."""
-        values: Array = self._rows[1 + FIELDS.index(name)]
-        return values
+        return self._rows[1 + FIELDS.index(name)]
 
     def extend(self, time: Array, values: Array) -> None:
         """Add rows that are later than all others: times (rows,) and values (fields, rows)."""

@@ -51,8 +51,7 @@ def foot_force_torque(leg: LegView, push: Array, side: Array) -> Array:
 
     A positive ``push`` presses the foot to the ground, N, (n,); ``side`` is the force forwards.
     """
-    torque: Array = np.einsum("nij,ni->nj", leg.jacobian, np.stack([push, side], axis=-1))
-    return torque
+    return np.einsum("nij,ni->nj", leg.jacobian, np.stack([push, side], axis=-1))
 
 
 def leg_force(robot: Robot, leg: LegView, torque: Array) -> Array:
@@ -64,8 +63,7 @@ def leg_force(robot: Robot, leg: LegView, torque: Array) -> Array:
     determinant = a * d - b * c
     least = 0.1 * robot.thigh.length * robot.shank.length
     bounded = np.where(determinant < 0, -1.0, 1.0) * np.maximum(np.abs(determinant), least)
-    force: Array = (d * torque[:, 0] - c * torque[:, 1]) / bounded
-    return force
+    return (d * torque[:, 0] - c * torque[:, 1]) / bounded
 
 
 def retraction(start: Array, end: Array, elapsed: Array, duration: Gain) -> tuple[Array, Array]:
@@ -110,8 +108,7 @@ class Phases:
 
     def are(self, phase: IntEnum) -> BoolArray:
         """Return which legs are in a phase, (n,)."""
-        answer: BoolArray = self.phase == phase
-        return answer
+        return self.phase == phase
 
     def enter(self, who: BoolArray, phase: IntEnum, since: Array | float = 0.0) -> None:
         """Put legs into a phase that began ``since`` seconds ago, (n,)."""
@@ -139,5 +136,4 @@ class TouchdownDetector:
         self._seen[0, 0] = leg.rate - np.einsum("ni,ni->n", leg.jacobian[:, 0], planned)
         self._seen[0, 1] = leg_force(self._robot, leg, torque)
         excess, force = np.sort(self._seen, axis=0)[len(self._seen) // 2]
-        touched: BoolArray = (excess < gains.touchdown_rate) | (force > gains.touchdown_force)
-        return touched
+        return (excess < gains.touchdown_rate) | (force > gains.touchdown_force)

@@ -168,8 +168,7 @@ class TrueStateMpc:
     @property
     def pushing(self) -> BoolArray:
         """Which legs push, (n,)."""
-        pushing: BoolArray = self._phase == hop_law.PUSH
-        return pushing
+        return self._phase == hop_law.PUSH
 
     @property
     def folding(self) -> BoolArray:
@@ -177,8 +176,7 @@ class TrueStateMpc:
         legs = self._legs
         rests = (self._phase == hop_law.LANDING) & (np.abs(legs.height_rate) < hop_law.REST_SPEED)
         leaves = (self._phase == hop_law.FLIGHT) & (legs.foot_clearance() <= 0)
-        folding: BoolArray = rests | leaves
-        return folding
+        return rests | leaves
 
     def state(self) -> dict[str, Array]:
         """Return what is remembered from tick to tick."""
