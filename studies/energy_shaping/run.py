@@ -71,12 +71,12 @@ class Knowing(LiteralEnergyShaping):
 
     def _estimate_height(self, leg: LegView) -> None:
         super()._estimate_height(leg)
-        flying = self._phases.are(Phase.FLIGHT)
+        flying = self._phase == Phase.FLIGHT
         self._highest = np.where(flying, np.maximum(self._highest, self.legs.height), 0.0)
 
     def _settled(self) -> BoolArray:
         """Return where contact no longer flickers after a change of phase."""
-        settled: BoolArray = self._phases.clock > 4 * self.period
+        settled: BoolArray = self._clock > 4 * self.period
         return settled
 
 

@@ -12,7 +12,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import cast
 
-from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
+from hopping_leg.deploy.realtime import prefer_this_process, uninterrupted
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.emulator.server import EmulatorConfig, Server
@@ -104,7 +104,7 @@ def _serve(start: EmulatorConfig, pipe: Connection) -> None:
         return
     server = Server(robot, port)
     pipe.send(port.path)
-    prefer_this_thread()
+    prefer_this_process()
     with uninterrupted():
         server.run(lambda: not _answer_parent(pipe, robot, log))
     port.close()

@@ -69,19 +69,28 @@ class MoteusLink:
 
         Waits no longer than ``until``, s on the loop's clock.
         """
-        question = replies.Question(self.transforms, self._clocks, self.clock.now())
+        asked, late = self.clock.now(), list[tuple[int, drive_link.Reply]]()
+        fresh: list[drive_link.Reply | None] = [None, None]
         self.transport.send(self._frames(outgoing, query=True))
         for frame in self._arriving(until):
-            question.take(frame, self.clock.now())
-            if question.answered:
+            for joint, wire in enumerate(self.transforms):
+                if frame.arbitration_id == wire.id << 8 and fresh[joint] is None:
+                    clock, now = self._clocks[joint], self.clock.now()
+                    reply = replies.read_reply(frame.data, wire, clock, now)
+                    if reply is not None and reply.taken < asked - replies.SLACK:
+                        late.append((joint, reply))
+                    else:
+                        fresh[joint] = reply
+            if all(fresh):
                 break
-        found = question.result()
+        hip, knee = fresh
+        found = drive_link.Exchange((hip, knee), tuple(late))
         if not self.robot.hardware.height.source:
             return found
-        sensed = [reply.sensed for reply in found.replies if reply]
+        sensed = [reply.sensed for reply in fresh if reply]
         reading = self.sensed(next(filter(math.isfinite, sensed), math.nan))
         height = self.robot.hardware.height.height(reading)
-        q = np.array([reply.position if reply else math.nan for reply in found.replies])
+        q = np.array([reply.position if reply else math.nan for reply in fresh])
         clearance = kinematics.foot_clearance(self.robot, np.array(height), q)
         return replace(found, height=height, clearance=float(clearance))
 

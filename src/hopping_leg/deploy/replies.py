@@ -12,8 +12,7 @@ from moteus import multiplex
 from moteus.multiplex import SubframeType
 from moteus.protocol import Register, scale_register
 
-from hopping_leg.deploy.drive_link import Exchange, JointTransform, Reply
-from hopping_leg.deploy.frames import Frame
+from hopping_leg.deploy.drive_link import JointTransform, Reply
 
 _WRAP, _HALF = 1 << 32, 1 << 31
 _DRIFT = 2e-4  # Most that two clocks drift apart, s/s: both are quartzes
@@ -63,43 +62,6 @@ class DriveClock:
         allowance = _DRIFT * (arrived - self._updated)
         self._offset, self._updated = min(self._offset + allowance, arrived - time), arrived
         return time + self._offset
-
-
-class Question:
-    """One tick's question to both drives, asked at a time, s; frames are judged as they arrive."""
-
-    def __init__(
-        self,
-        transforms: tuple[JointTransform, JointTransform],
-        clocks: tuple[DriveClock, DriveClock],
-        asked: float,
-    ) -> None:
-        self._transforms, self._clocks, self._asked = transforms, clocks, asked
-        self._fresh: list[Reply | None] = [None, None]
-        self._late: list[tuple[int, Reply]] = []
-
-    @property
-    def answered(self) -> bool:
-        """Whether both drives have answered."""
-        return all(self._fresh)
-
-    def take(self, frame: Frame, now: float) -> None:
-        """Judge a frame that arrived now, s; what is no drive's answer is nothing."""
-        for joint, transform in enumerate(self._transforms):
-            if frame.arbitration_id != transform.id << 8 or self._fresh[joint] is not None:
-                continue
-            reply = read_reply(frame.data, transform, self._clocks[joint], now)
-            if reply is None:
-                continue
-            if reply.taken < self._asked - SLACK:
-                self._late.append((joint, reply))
-            else:
-                self._fresh[joint] = reply
-
-    def result(self) -> Exchange:
-        """Return what has come so far."""
-        hip, knee = self._fresh
-        return Exchange((hip, knee), tuple(self._late))
 
 
 def read_registers(data: bytes) -> dict[int, Any]:

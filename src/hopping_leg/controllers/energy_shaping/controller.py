@@ -14,7 +14,6 @@ from hopping_leg.controllers.energy_shaping.virtual_leg import (
     PUSH_LIMIT,
     LegView,
     Phase,
-    Phases,
     TouchdownDetector,
     foot_force_torque,
     retraction,
@@ -59,7 +58,7 @@ class EnergyShaping:
             np.stack([getattr(self.gains, f"{joint}_{kind}") for joint in JOINTS], axis=-1)
             for kind in ("stiffness", "damping")
         )
-        self._phases = Phases(count)
+        self._phase, self._clock = np.full(count, Phase.LIFTOFF), np.zeros(count)
         self._k_ratio = np.ones(count)
         self._length_0 = np.full(count, np.nan)
         self._pushed = np.full(count, np.nan)
@@ -76,14 +75,14 @@ class EnergyShaping:
         leg = view_leg(self.robot, *self._joints(measurement))
         self._length_0 = np.where(np.isnan(self._length_0), leg.length, self._length_0)
         self._pushed = np.where(np.isnan(self._pushed), command, self._pushed)
-        self._phases.tick(self.period)
+        self._clock = self._clock + self.period
         gains = self.gains
         liftoff = self._length(gains.liftoff_length, gains.liftoff_slope, command)
         landing = self._length(gains.landing_length, gains.landing_slope, command)
         self._end_touchdown(leg, command)
         self._end_push(leg, liftoff)
         target = kinematics.joint_angles(self.robot, np.stack([landing, 0 * landing], axis=-1))
-        clock = self._phases.clock
+        clock = self._clock
         posture, posture_rate = retraction(self._liftoff_q, target, clock, gains.retract_time)
         flying = self._stiffness * (posture - leg.q) + self._damping * (posture_rate - leg.qd)
         self._end_flight(leg, posture_rate, flying, command)
@@ -91,8 +90,8 @@ class EnergyShaping:
         push = self._force(leg, command, liftoff, landing)
         side = -gains.kp_y * leg.y - gains.kd_y * leg.y_rate
         pressing = foot_force_torque(leg, push, side)
-        share = np.where(self._phases.are(Phase.FLIGHT), 0.0, 1.0)
-        pushes = self._phases.are(Phase.LIFTOFF)
+        share = np.where(self._phase == Phase.FLIGHT, 0.0, 1.0)
+        pushes = self._phase == Phase.LIFTOFF
         self._share = np.where(pushes, self._pushing_share(leg, liftoff), share)
         self._rate = leg.rate
         return flying + self._share[:, None] * (pressing - flying)
@@ -104,7 +103,7 @@ class EnergyShaping:
             "estimated_apex_m": self._apex[0],
             "ballistic_apex_m": self._apex[1],
             "flight_time_apex_m": self._apex[2],
-            "phase": self._phases.phase.astype(np.float64),
+            "phase": self._phase.astype(np.float64),
             "gain_k": self._gain(self._pushed),
         }
 
@@ -124,25 +123,25 @@ class EnergyShaping:
         thrust = self._gain(command) * forward + gains.push_damping * (intended - leg.rate)
         brake = gains.touchdown_stiffness * (landing - leg.length)
         brake = brake - gains.touchdown_damping * leg.rate
-        return np.where(self._phases.are(Phase.LIFTOFF), thrust, brake)
+        return np.where(self._phase == Phase.LIFTOFF, thrust, brake)
 
     def _end_push(self, leg: LegView, liftoff: Array) -> None:
         done, rate, since = self._lifted_off(leg, liftoff)
-        who = self._phases.are(Phase.LIFTOFF) & (done | (self._phases.clock > PUSH_LIMIT))
+        who = (self._phase == Phase.LIFTOFF) & (done | (self._clock > PUSH_LIMIT))
         self._liftoff_height = np.where(who, leg.stand, self._liftoff_height)
         self._liftoff_rate = np.where(who, rate, self._liftoff_rate)
         self._liftoff_q = np.where(who[:, None], leg.q, self._liftoff_q)
-        self._phases.enter(who, Phase.FLIGHT, since)
+        self._enter(who, Phase.FLIGHT, since)
 
     def _end_flight(self, leg: LegView, posture_rate: Array, flying: Array, command: Array) -> None:
-        gains, clock = self.gains, self._phases.clock
+        gains, clock = self.gains, self._clock
         shortest = gains.flight_min + gains.flight_min_slope * (command - gains.reference)
         touched = self._touched(leg, posture_rate, flying, shortest)
-        who = self._phases.are(Phase.FLIGHT) & (touched | (clock > FLIGHT_LIMIT))
+        who = (self._phase == Phase.FLIGHT) & (touched | (clock > FLIGHT_LIMIT))
         if who.any():  # a touchdown that nobody noticed came before contact was believed
             too_short = np.minimum(clock, shortest)
             self._judge_hop(who, leg, command, np.where(touched, clock, too_short))
-        self._phases.enter(who, Phase.TOUCHDOWN)
+        self._enter(who, Phase.TOUCHDOWN)
 
     def _judge_hop(self, who: BoolArray, leg: LegView, command: Array, airborne: Array) -> None:
         gains = self.gains
@@ -157,17 +156,21 @@ class EnergyShaping:
         self._k_ratio = np.where(who, gain, self._k_ratio)
 
     def _end_touchdown(self, leg: LegView, command: Array) -> None:
-        clock = self._phases.clock
-        turned = (self._braked_rate(leg) >= 0) & (clock > 2 * self.period)
-        who = self._phases.are(Phase.TOUCHDOWN) & (turned | (clock > BRAKE_LIMIT))
+        turned = (self._braked_rate(leg) >= 0) & (self._clock > 2 * self.period)
+        who = (self._phase == Phase.TOUCHDOWN) & (turned | (self._clock > BRAKE_LIMIT))
         self._length_0 = np.where(who, leg.length, self._length_0)
         self._pushed = np.where(who, command, self._pushed)
-        self._phases.enter(who, Phase.LIFTOFF)
+        self._enter(who, Phase.LIFTOFF)
+
+    def _enter(self, who: BoolArray, phase: Phase, since: Array | float = 0.0) -> None:
+        """Put legs into a phase that began ``since`` seconds ago, (n,)."""
+        self._phase = np.where(who, phase, self._phase)
+        self._clock = np.where(who, since, self._clock)
 
     def _estimate_height(self, leg: LegView) -> None:
-        start, clock = self._liftoff_height, self._phases.clock
+        start, clock = self._liftoff_height, self._clock
         flying = equations.ballistic_height(start, self._liftoff_rate, clock)
-        self._height = np.where(self._phases.are(Phase.FLIGHT), flying, leg.stand)
+        self._height = np.where(self._phase == Phase.FLIGHT, flying, leg.stand)
 
     # What the paper's own law, or a study that asks the simulator, does otherwise.
 
@@ -184,7 +187,7 @@ class EnergyShaping:
 
     def _touched(self, leg: LegView, planned: Array, torque: Array, shortest: Array) -> BoolArray:
         pushed = self._detector.update(leg, planned, torque, self.gains)
-        return pushed & (self._phases.clock > shortest)
+        return pushed & (self._clock > shortest)
 
     def _braked_rate(self, leg: LegView) -> Array:
         return leg.rate

@@ -90,32 +90,6 @@ class Phase(IntEnum):
     """Brakes the fall, on the ground."""
 
 
-class Phases:
-    """Phase of each leg, the one of value 0 at first, and the time spent in it.
-
-    Attributes:
-        phase: Values of ``Phase`` or another enumeration, (n,).
-        clock: Time since the phase began, s, (n,).
-    """
-
-    def __init__(self, count: int) -> None:
-        self.phase = np.zeros(count, np.int64)
-        self.clock = np.zeros(count)
-
-    def tick(self, period: float) -> None:
-        """Let a control period pass, s."""
-        self.clock = self.clock + period
-
-    def are(self, phase: IntEnum) -> BoolArray:
-        """Return which legs are in a phase, (n,)."""
-        return self.phase == phase
-
-    def enter(self, who: BoolArray, phase: IntEnum, since: Array | float = 0.0) -> None:
-        """Put legs into a phase that began ``since`` seconds ago, (n,)."""
-        self.phase = np.where(who, int(phase), self.phase)
-        self.clock = np.where(who, since, self.clock)
-
-
 class TouchdownDetector:
     """Watches how n legs deviate from the planned retraction.
 
