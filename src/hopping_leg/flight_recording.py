@@ -19,14 +19,10 @@ from hopping_leg import errors, trace
 from hopping_leg.arrays import Array
 from hopping_leg.io import parse_json
 
-HEADER, ROW, EVENT = range(3)
-"""Kinds of frames."""
+HEADER, ROW, EVENT = range(3)  # Kinds of frames
 
-SUFFIX = ".blackbox"
-"""End of the files' names."""
-
-MAGIC = b"HOPBOX1\n"
-"""What every file begins with."""
+SUFFIX = ".blackbox"  # End of the files' names
+MAGIC = b"HOPBOX1\n"  # What every file begins with
 
 _FRAME = struct.Struct("<BI")
 _CRC = struct.Struct("<I")

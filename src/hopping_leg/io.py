@@ -17,8 +17,7 @@ import msgspec
 
 from hopping_leg.errors import HoppingLegError, TraceError, UsageError, unknown_name
 
-Tree = dict[str, Any]
-"""Nested tables as read from TOML or JSON."""
+Tree = dict[str, Any]  # Nested tables as read from TOML or JSON
 
 Kind = TypeVar("Kind")
 

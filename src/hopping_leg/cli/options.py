@@ -12,8 +12,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.robot import DEFAULT_ROBOT
 from hopping_leg.terminal import plain_console, print_table
 
-Heights = Annotated[tuple[float, ...], tyro.conf.arg(metavar="M ...")]
-"""Heights in metres."""
+Heights = Annotated[tuple[float, ...], tyro.conf.arg(metavar="M ...")]  # Heights in metres
 RobotFile = Annotated[str, tyro.conf.arg(help="A shipped robot or the path of a .toml file.")]
 OwnRobot = Annotated[
     str | None,

@@ -11,8 +11,7 @@ from hopping_leg.controllers import policy, protocol
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import Robot, command_limits
 
-Range = tuple[float, float]
-"""Lowest and highest, m."""
+Range = tuple[float, float]  # Lowest and highest, m
 
 
 class Commands(Protocol):

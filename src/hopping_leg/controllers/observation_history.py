@@ -20,8 +20,7 @@ from hopping_leg.sim.channel import DELAY_DEPTH, SAMPLES, Measurement
 FULL_TORQUE = "full_torque"
 """Graph input with which the network's actions are multiplied, N m, (n, 2)."""
 
-Inputs = dict[str, Array32]
-"""Graph input to its array, (n, ...)."""
+Inputs = dict[str, Array32]  # Graph input to its array, (n, ...)
 
 
 class ObservationHistory(ABC):

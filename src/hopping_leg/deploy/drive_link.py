@@ -6,8 +6,7 @@ from enum import Enum, IntEnum
 
 from hopping_leg.robot.parameters import Robot
 
-Pair = tuple[float, float]
-"""Values of hip and knee."""
+Pair = tuple[float, float]  # Values of hip and knee
 
 
 class DriveMode(IntEnum):
@@ -110,8 +109,7 @@ class DriveCommand:
 
 STOP = DriveCommand(Action.STOP)
 BRAKE = DriveCommand(Action.BRAKE)
-LIMP = DriveCommand(Action.TORQUE)
-"""Torque control at zero torque."""
+LIMP = DriveCommand(Action.TORQUE)  # Torque control at zero torque
 
 
 @dataclass(frozen=True, slots=True)

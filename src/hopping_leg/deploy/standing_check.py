@@ -15,11 +15,8 @@ from hopping_leg.arrays import Array
 from hopping_leg.controllers.joint_pd import JointGains
 from hopping_leg.robot import Robot, dynamics, kinematics
 
-DEPTH = 0.15
-"""Depth of the squat over the length of the standing leg."""
-
-UPWARD = (0.85, 1.25)
-"""Shares of its file's weight that a leg may seem to carry."""
+DEPTH = 0.15  # Depth of the squat over the length of the standing leg
+UPWARD = (0.85, 1.25)  # Shares of its file's weight that a leg may seem to carry
 
 KNEE = (0.3, 1.8)
 """Shares of what is asked by which the knee may bend; the weight and friction change it."""
@@ -28,8 +25,7 @@ SIDEWAYS = (-0.22, 0.1)
 """Ways of the foot, forward and back, over the depth of the squat: below zero, as friction that the
 file does not tell drags it over soft ground."""
 
-DRIFT = 0.7
-"""Largest way of the foot from beginning to end of the squat, over its depth."""
+DRIFT = 0.7  # Largest way of the foot from beginning to end of the squat, over its depth
 
 
 @dataclass(frozen=True)

@@ -21,15 +21,13 @@ if TYPE_CHECKING:
     from hopping_leg.emulator.drive import EmulatedDrive
     from hopping_leg.emulator.leg import EmulatedLeg
 
-KINDS: "dict[str, type[FaultKind]]" = {}
-"""Every kind that a script may name."""
+KINDS: "dict[str, type[FaultKind]]" = {}  # Every kind that a script may name
 
 _SINCE = ("start", "powered", "flight")
 """From when on ``at`` counts: the emulator's start, both drives powered, first lift-off."""
 
 _DRIVES = (*JOINTS, "both")
-Registers = dict[int, float]
-"""What a drive says, by register."""
+Registers = dict[int, float]  # What a drive says, by register
 _FLIPS = 1 << 16
 _NOISE = b"@#!%\x07~ moteus?"
 

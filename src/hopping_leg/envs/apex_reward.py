@@ -19,8 +19,7 @@ from hopping_leg.envs.paper_reward import jerk_term, position_term
 from hopping_leg.envs.rewards import LastingTerm, Reward, RewardTerm, Transition, sum_of_joints
 from hopping_leg.robot import Robot, kinematics
 
-GRAVITY = 10.4
-"""Deceleration in flight that predictions assume, rail drag included, m/s2."""
+GRAVITY = 10.4  # Deceleration in flight that predictions assume, rail drag included, m/s2
 TOUCH = 3.0
 """What a tick adds to the closeness to the ground in which base or knee are within 6 mm of it."""
 

@@ -10,14 +10,9 @@ from hopping_leg.controllers import robot_numbers
 from hopping_leg.robot import GRAVITY, Robot
 from hopping_leg.sim import LegSimulator
 
-OF_MOTION = 4
-"""Height, its rate, contact, and how far the last hop missed its command."""
-
-MISSED = 3
-"""Place of the last of these."""
-
-ERROR_GAIN = 16.0
-"""Of errors of hops, over the leg's length."""
+OF_MOTION = 4  # Height, its rate, contact, and how far the last hop missed its command
+MISSED = 3  # Place of the last of these
+ERROR_GAIN = 16.0  # Of errors of hops, over the leg's length
 
 _MOST_ERROR = 0.3
 

@@ -17,9 +17,7 @@ the leg. A leg's length is that from the hip to the foot's centre."""
 _STANDING_LENGTH = 0.2  # foot below the hip
 _DROP_LENGTH, _DROP_OFFSET = (0.15, 0.25), 0.02
 _DROP_CLEARANCE = 0.1  # at most, under the foot
-_NEAR_APEX = (-0.06, 0.03)
-"""Where most starts ``hop`` begin, relative to the commanded apex."""
-
+_NEAR_APEX = (-0.06, 0.03)  # Where most starts ``hop`` begin, relative to the commanded apex
 _STANDING_SHARE = 0.3  # of the starts ``hop``
 
 

@@ -20,8 +20,7 @@ from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import SAMPLES, Channel
 from hopping_leg.sim.compiled import compiled
 
-SIZE = 15
-"""Entries of the paper's observation."""
+SIZE = 15  # Entries of the paper's observation
 
 _LEAST_SPAN = 0.05  # half the command range at least, m, so that a single command has a scale
 _VELOCITY = 10.0  # joint velocity that is shown as 1, rad/s

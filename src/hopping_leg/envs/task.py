@@ -20,12 +20,8 @@ from hopping_leg.robot import Robot
 from hopping_leg.sim import LegSimulator, Measurement, Plant, randomization
 from hopping_leg.sim.compiled import compiled
 
-_RECENT = 500
-"""Hops that count as the latest."""
-
-_PRIVILEGED = 10
-"""Entries of the true state, where all legs are the same."""
-
+_RECENT = 500  # Hops that count as the latest
+_PRIVILEGED = 10  # Entries of the true state, where all legs are the same
 _CLEARANCE_GAIN = 10.0  # scale of clearances in there, 1/m
 
 

@@ -37,8 +37,7 @@ class Case:
     """Height of the command's steps, m."""
 
 
-Alter = Callable[[Case, float], Case]
-"""Puts a level of an axis into a case."""
+Alter = Callable[[Case, float], Case]  # Puts a level of an axis into a case
 
 
 @dataclass(frozen=True)

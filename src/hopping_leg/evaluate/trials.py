@@ -19,8 +19,7 @@ from hopping_leg.trace import Trace, interpolated
 
 COMMANDS = (0.25, 0.30, 0.35)
 """Apex heights the paper trains and tests, m, for a leg of the paper's size."""
-STAIRCASE = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)
-"""Commands of the 30 s trial, m, 5 s each (Fig. 5)."""
+STAIRCASE = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)  # Commands of the 30 s trial, m, 5 s each (Fig. 5)
 LADDER = (0.22, 0.24, 0.26, 0.28, 0.30, 0.32, 0.34, 0.36, 0.38, 0.40)
 """Commands that show how a controller interpolates and where it ends, m."""
 KINDS = ("fixed", "sequence", "staircase", "ladder")

@@ -11,8 +11,7 @@ from typing import Literal
 from hopping_leg.errors import RobotError, unknown_name
 from hopping_leg.io import quantity
 
-REGISTER_MAP = 5
-"""Version of the drives' register map that this package speaks (register 0x102)."""
+REGISTER_MAP = 5  # Version of the drives' register map that this package speaks (register 0x102)
 
 
 @dataclass(frozen=True)

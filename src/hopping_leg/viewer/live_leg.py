@@ -11,8 +11,7 @@ from hopping_leg.robot import Robot, SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, LegSimulator, Measurement, NoiseAndDelay, Plant
 from hopping_leg.viewer.tracks import FIELDS, KEPT, MOST, Track
 
-PUSH_SECONDS = 0.05
-"""How long a push lasts."""
+PUSH_SECONDS = 0.05  # How long a push lasts
 
 Range = command_schedule.Range
 

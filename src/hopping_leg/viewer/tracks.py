@@ -17,8 +17,7 @@ from hopping_leg.robot import Robot, kinematics, load_robot
 from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.trace import Trace
 
-MOST = 2
-"""Legs side by side."""
+MOST = 2  # Legs side by side
 
 FIELDS = (
     "command_m",
@@ -32,8 +31,7 @@ FIELDS = (
 )
 """What a row holds beside its time; names are those of traces."""
 
-KEPT = round(10 * CONTROL_RATE)
-"""Rows of the past that are kept of what goes on."""
+KEPT = round(10 * CONTROL_RATE)  # Rows of the past that are kept of what goes on
 
 _ANGLES = ("hip_position_rad", "knee_position_rad")
 _ESTIMATE = "estimated_height_m"

@@ -14,8 +14,7 @@ from hopping_leg import errors, io
 from hopping_leg.arrays import Array
 from hopping_leg.robot.parameters import JOINTS, Robot
 
-Gain = float
-"""One value for all legs; a search for gains gives one per leg, (n,)."""
+Gain = float  # One value for all legs; a search for gains gives one per leg, (n,)
 
 
 @dataclass(frozen=True)

@@ -27,11 +27,8 @@ HOP = np.dtype(
 at which landing ends and at which the push ends, all m, deceleration from which on the leg brakes,
 m/s2, push-off force, N, control periods of the push since that was planned."""
 
-LIFTED = 0.01
-"""Gap between foot and ground with which a leg is in the air, whatever its length, m."""
-
-REST_SPEED = 0.1
-"""Speed of the hip on landing that counts as rest, m/s."""
+LIFTED = 0.01  # Gap between foot and ground with which a leg is in the air, whatever its length, m
+REST_SPEED = 0.1  # Speed of the hip on landing that counts as rest, m/s
 
 _STRETCHED = 0.97  # share of the stretched length at which a push ends in any case
 _FALL = 0.3  # force over the weight with which a leg sinks until it has to brake

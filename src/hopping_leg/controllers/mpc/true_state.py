@@ -16,11 +16,8 @@ from hopping_leg.robot import GRAVITY, Robot
 from hopping_leg.sim import CONTROL_RATE, LegSimulator, stepper
 from hopping_leg.sim.leg_table import leg_table
 
-_TICKS = 200
-"""Control periods after which a simulated hop is given up."""
-
-_FIRST_PUSH = 2.5
-"""Push-off force with which planning begins, over the weight."""
+_TICKS = 200  # Control periods after which a simulated hop is given up
+_FIRST_PUSH = 2.5  # Push-off force with which planning begins, over the weight
 
 
 @dataclass(frozen=True)
