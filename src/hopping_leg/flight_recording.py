@@ -50,18 +50,12 @@ def _frames(content: bytes, at: int) -> Iterator[tuple[int, bytes, int]]:
 
 
 class FlightRecorderTail:
-    """Reads what is new in a flight recording.
-
-    Args:
-        path: The file.
+    """Reads what is new in a flight recording; TraceError says that it cannot be read.
 
     Attributes:
         columns: Names of the rows' values; empty until the header is there.
         header: Facts about the run; empty until the header is there.
         events: So far, in order.
-
-    Raises:
-        TraceError: The file cannot be read.
     """
 
     def __init__(self, path: Path) -> None:

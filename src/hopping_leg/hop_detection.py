@@ -91,8 +91,7 @@ def measure_hops(
 def find_bounces(height: Array, clearance: Array) -> IntArray:
     """Find maxima of the base height with the foot on the ground: hops that never took off.
 
-    Returns:
-        Index of each maximum that stands at least ``BOUNCE`` out of its surroundings, (bounces,).
+    Each, (bounces,), stands at least ``BOUNCE`` out of its surroundings.
     """
     from scipy.signal import find_peaks  # takes a second, which no other part of the package needs
 

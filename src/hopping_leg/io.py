@@ -143,15 +143,10 @@ def quantity(unit: str, default: float | None, **valid: bool) -> Any:  # noqa: A
 def read_dataclass(
     kind: type[Kind], tree: object, origin: str, *, error: type[HoppingLegError] = UsageError
 ) -> Kind:
-    """Return the dataclass that a table describes, as ``msgspec.convert`` does.
+    """Return the dataclass that a table, field names to values, describes, by ``msgspec.convert``.
 
-    Beyond that, unknown fields are refused, and numbers that are not finite.
-
-    Args:
-        kind: The dataclass.
-        tree: The table: field names to values.
-        origin: Where it comes from, e.g. the file, for messages.
-        error: Raised where something is wrong.
+    Beyond that, unknown fields are refused, and numbers that are not finite. The origin, e.g. a
+    file, is for messages.
 
     Raises:
         HoppingLegError: Naming the field and what was valid; ``error`` unless ``kind`` raised it.

@@ -29,12 +29,10 @@ def print_table(table: Table, console: Console | None = None) -> None:
 
 
 class Progress(contextlib.AbstractContextManager["Progress"]):
-    """A bar of all work on a terminal, a line every half minute elsewhere.
+    """A bar of all work on a terminal, a line every half minute elsewhere, nothing if ``quiet``.
 
-    Args:
-        title: What is done, as long as no label is shown.
-        parts: Labels that the work has, each from 0 to 1; 0 where shares are of all work.
-        quiet: Show nothing.
+    The title is shown as long as no label is; ``parts`` is how many labels the work has, each from
+    0 to 1, or 0 where shares are of all work.
     """
 
     def __init__(self, title: str = "", *, parts: int = 0, quiet: bool = False) -> None:

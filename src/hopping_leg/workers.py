@@ -23,13 +23,10 @@ _PATIENCE = 5.0  # how long an address may take to answer, s
 
 
 class ProcessWorkers:
-    """Processes of this machine, as a context manager.
+    """Processes of this machine, as many as ``count``, 0 for one per core, as a context manager.
 
     They end with it, and with this process, however that one ends: the same command, given again,
-    must not find its old workers still writing.
-
-    Args:
-        count: How many; 0 takes one per core. The work of a single one is done in this process.
+    must not find its old workers still writing. The work of a single one is done in this process.
     """
 
     def __init__(self, count: int = 0) -> None:

@@ -160,12 +160,9 @@ class Card:
 class Policy:
     """Runs a policy file that came from ``origin``; implements ``Controller``.
 
-    Attributes:
-        digest: First 16 hex digits of the file's SHA-256.
-        seconds: How long it takes for one leg on this computer, s.
-
-    Raises:
-        PolicyError: The content is no policy file that this version can run, or never returns.
+    The digest are the first 16 hex digits of the file's SHA-256; ``seconds`` is how long it takes
+    for one leg on this computer. PolicyError says that the content is no policy file that this
+    version can run, or never returns.
     """
 
     def __init__(self, content: bytes, origin: str, name: str) -> None:

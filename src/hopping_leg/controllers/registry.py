@@ -99,15 +99,11 @@ def load_controller(
     other: OtherRobot = "warn",
     simulated: bool = False,
 ) -> protocol.Controller:
-    """Load a controller for a robot.
+    """Load a controller for a robot that it shall drive at a rate, Hz.
 
-    Args:
-        name_or_path: One of ``controller_names()``, the path of an ``.onnx`` file or of a gain
-            file (``.toml``) for energy shaping, or a Python class, see ``user_controllers``.
-        robot: The leg it shall drive.
-        rate: Control rate, Hz.
-        other: See ``OtherRobot``.
-        simulated: Whether the leg is a simulated one, whose true state a controller may see.
+    It is one of ``controller_names()``, an ``.onnx`` file, a gain file (``.toml``) for energy
+    shaping, or a Python class, see ``user_controllers``; of a ``simulated`` leg it may see the true
+    state.
 
     Raises:
         PolicyError: The file is missing, truncated or foreign, or does not fit the robot or rate.

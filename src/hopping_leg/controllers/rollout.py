@@ -120,15 +120,10 @@ def rollout(
 ) -> Rollout:
     """Let a controller hop from a standing start; a ``PrivilegedController`` is shown the legs.
 
-    Args:
-        controller: Controls all legs at once.
-        config: The world it meets.
-        commands: Desired height for every tick and leg, m, (ticks, n).
-        seed: Seed of noise and delay.
-        on_tick: Called with (ticks done, ticks in all), for progress bars.
-        perturbation: Changes of the legs that ``config`` does not know; recorded heights are above
-            the ground of the moment, recorded commands are the controller's.
-        legs: What hops instead of what ``config`` describes.
+    It is asked for desired heights, m, (ticks, n); noise and delay follow from the seed.
+    ``on_tick`` is called with (ticks done, ticks in all). A perturbation changes legs in ways that
+    ``config`` does not know: recorded heights are above the ground of the moment, recorded commands
+    are the controller's. ``legs`` hop instead of what ``config`` describes.
 
     Returns:
         One row per control period: the state at its start and the torques during it.

@@ -28,10 +28,8 @@ def _wait_readable(descriptor: int, until: float) -> bool:
 class LineTransport:
     """Speaks to an fdcanusb over a descriptor that does not block; see ``Transport``.
 
-    Args:
-        descriptor: Is closed with it.
-        checksums: Whether lines carry checksums from the start, or once the adapter asks for them.
-        wait: Tells whether a descriptor has something to read until a time.
+    Lines carry checksums from the start, or once the adapter asks for them. ``wait`` tells whether
+    a descriptor has something to read until a time.
     """
 
     def __init__(

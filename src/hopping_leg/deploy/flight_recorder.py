@@ -26,19 +26,13 @@ _WAITING = 1 << 26  # Most that waits in memory for a full disk, bytes: a quarte
 class FlightRecorder:
     """Writes one run; rows and events never wait for the disk, unless time is virtual.
 
-    Args:
-        path: File to create; ends in ``SUFFIX``.
-        columns: Names of the rows' values.
-        header: Facts about the run, JSON.
-        threaded: Write in a thread; in virtual time, where nothing is late, it only costs time.
+    It writes in a thread; in virtual time, where nothing is late, that only costs time. TraceError
+    says that the file exists or cannot be created.
 
     Attributes:
         rows: How many were recorded.
         lost: How many frames are not in the file; known once it is closed.
         error: What the disk said last when it refused something, None if it never did.
-
-    Raises:
-        TraceError: The file exists or cannot be created.
     """
 
     def __init__(

@@ -74,16 +74,10 @@ def perform(
 ) -> Performance:
     """Arm, run a sequence, stop; a signal stops it as the operator would, a second one ends it.
 
-    Args:
-        link: To drives that were found fit.
-        sequence: What the leg does.
-        limits: The supervisor's limits.
-        path: File of the trace; the flight recording lies beside it until the trace is complete.
-        header: Header of the trace.
-        clock: None takes the computer's.
-        realtime: Ask for priority and locked memory.
-        threaded: Record in a thread, see ``FlightRecorder``.
-        beside: Makes what is open while the loop runs, e.g. a keyboard that stops it.
+    The drives behind the link were found fit. The flight recording lies beside ``path``, the
+    trace's, until that is complete. Without ``clock`` time is the computer's. ``realtime`` asks for
+    priority and locked memory, ``threaded`` records in a thread, see ``FlightRecorder``; ``beside``
+    makes what is open while the loop runs, e.g. a keyboard that stops it.
 
     Raises:
         TraceError: The flight recording cannot be created, or the trace cannot be written.

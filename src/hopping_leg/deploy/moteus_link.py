@@ -29,15 +29,10 @@ _PLACE_BYTES = struct.pack("<f", _PLACE)
 
 
 class MoteusLink:
-    """The way to two drives.
+    """The way to a robot's two drives; closes the transport that carries the frames.
 
-    Args:
-        robot: Whose drives.
-        transport: Carries the frames; the link closes it.
-        clock: None takes the computer's.
-
-    Attributes:
-        controllers: Of the client library; they make commands.
+    Without a clock the time is the computer's. ``controllers``, of the client library, make
+    commands.
     """
 
     def __init__(

@@ -97,16 +97,10 @@ class SequenceStep:
 class MotionSequence:
     """Runs from the moment that the drives follow torques; steps once a tick.
 
-    Args:
-        controller: Hops.
-        commands: What it is told.
-        poses: Start and rest.
-        limiter: None goes without soft limits.
-        timing: Length of each part.
-        gains: Joint PD of rising and sinking.
-        checked: Robot as which the leg must stand and squat before it hops, see
-            ``standing_check``; None does not look, as for a leg whose foot is off the ground.
-        report: Called with what the squat looked like.
+    A ``limiter`` of None goes without soft limits. The gains are of rising and sinking. ``checked``
+    is the robot as which the leg must stand and squat before it hops, see ``standing_check``; None
+    does not look, as for a leg whose foot is off the ground. ``report`` is called with what the
+    squat looked like.
     """
 
     controller: protocol.Controller

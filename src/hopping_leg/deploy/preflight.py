@@ -55,20 +55,11 @@ _HOMED = 2  # Home state of a drive that knows where its output is (register 0x0
 
 @dataclass(frozen=True)
 class DriveInfo:
-    """One drive before arming; joint side, SI.
+    """One drive before arming, at the joint, SI; of one that does not answer nothing is known.
 
-    Attributes:
-        answers: Whether it answers at all; if not, nothing else is known.
-        firmware: Version of its firmware, as the register holds it.
-        register_map: Version of its register map.
-        serial: Serial number of its controller, 24 hex digits.
-        home: 2 where it has been told where its output is.
-        position: Joint angle as it believes, rad.
-        mode: As in ``DriveMode``.
-        fault: Code.
-        voltage: Bus voltage, V.
-        temperature: deg C.
-        settings: Name to value; NaN where the firmware does not know the name.
+    Versions are as its registers hold them, its controller's serial number has 24 hex digits. Home
+    is 2 where it has been told where its output is, the position is what it believes. Settings are
+    NaN where the firmware does not know their names.
     """
 
     answers: bool
@@ -86,14 +77,10 @@ class DriveInfo:
 
 @dataclass(frozen=True)
 class Finding:
-    """One check of one drive.
+    """One check of one drive: joint 0 is the hip, 1 the knee.
 
-    Attributes:
-        joint: 0 for the hip, 1 for the knee.
-        check: What was checked, in a word or two.
-        found: What was found.
-        complaint: Why the drive may not be armed, and what to do; empty if all is well.
-        setting: Name of the configuration entry that is wrong, if that is the complaint.
+    A complaint says why the drive may not be armed, and what to do; empty if all is well. The
+    setting is the configuration entry that is wrong, if that is the complaint.
     """
 
     joint: int
@@ -111,11 +98,7 @@ def check_drives(
 
 
 def require_fit(findings: Sequence[Finding]) -> None:
-    """Refuse to arm if anything is wrong.
-
-    Raises:
-        HardwareError: The first complaint, and how many more there are.
-    """
+    """Refuse to arm by a HardwareError: the first complaint, and how many more there are."""
     complaints = [f.complaint for f in findings if f.complaint]
     if complaints:
         more = f" {len(complaints) - 1} more: see `hop doctor`." if len(complaints) > 1 else ""

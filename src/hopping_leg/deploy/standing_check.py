@@ -62,12 +62,8 @@ class SquatFindings:
 def find(robot: Robot, bend: float, share: Array, q: Array, torque: Array) -> SquatFindings:
     """Return what a squat looks like by a robot's file.
 
-    Args:
-        robot: The leg as its file says.
-        bend: Change of the knee's angle that was asked, rad.
-        share: Times over the squat's time, (n,).
-        q: Joint angles, rad, (n, 2).
-        torque: Joint torques but for those against friction, N m, (n, 2).
+    The knee was asked to bend by an angle, rad, at shares of the squat's time, (n,); joint angles,
+    rad, and torques but for those against friction, N m, are (n, 2).
     """
     foot = kinematics.foot_position(robot, q)
     spot = foot[:, 1] + robot.foot.radius * q.sum(axis=1)  # a foot that rolls stays on its spot
@@ -80,12 +76,9 @@ def find(robot: Robot, bend: float, share: Array, q: Array, torque: Array) -> Sq
 
 
 def upward_force(robot: Robot, q: Array, torque: Array) -> Array:
-    """Return how a standing leg pushes upward, over its weight, (...).
+    """Return how a leg that stands as its file says pushes upward, over its weight, (...).
 
-    Args:
-        robot: The leg as its file says.
-        q: Joint angles, rad, (..., 2).
-        torque: Joint torques, N m, (..., 2).
+    Joint angles are in rad, torques in N m, (..., 2).
     """
     weight = dynamics.gravity_force(robot, q)
     transposed = np.swapaxes(kinematics.jacobian(robot, q), -1, -2)
@@ -95,13 +88,10 @@ def upward_force(robot: Robot, q: Array, torque: Array) -> Array:
 
 @dataclass
 class Squat:
-    """Lets a leg squat and remembers how it did.
+    """Lets a leg squat, as its file says, and remembers how it did.
 
-    Args:
-        robot: The leg as its file says.
-        start: Joint angles of the standing leg, rad, (2,).
-        gains: Of the joint PD, which bends the knee.
-        seconds: How long it takes.
+    It begins at a standing pose, rad, (2,), and takes so many seconds; the gains are of the joint
+    PD, which bends the knee.
     """
 
     robot: Robot

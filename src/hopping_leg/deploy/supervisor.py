@@ -53,11 +53,7 @@ class SupervisorState:
 def supervise(
     limits: safety_limits.SafetyLimits, before: SupervisorState, seen: stop_reasons.SupervisorInput
 ) -> tuple[SupervisorState, drive_link.DriveCommand]:
-    """Decide a tick.
-
-    Returns:
-        What to remember and what may leave: always finite and within the limits.
-    """
+    """Decide a tick: what to remember, and what leaves, always finite and within the limits."""
     counts = before.counts.after(limits, seen, before.told)
     state, cause = _next(limits, before, counts, seen)
     outgoing = _outgoing(limits, state, seen)

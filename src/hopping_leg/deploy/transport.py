@@ -24,11 +24,7 @@ _FORMS = (
 
 
 class Transport(Protocol):
-    """Carries frames; what it cannot carry is lost, and ``trouble`` says why.
-
-    Attributes:
-        trouble: What went wrong last, for the record.
-    """
+    """Carries frames; what it cannot carry is lost, and ``trouble`` says why."""
 
     trouble: str
 

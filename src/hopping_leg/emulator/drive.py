@@ -39,12 +39,8 @@ class Disturbances:
 class EmulatedDrive:
     """A moteus controller on a geared motor.
 
-    Args:
-        identity: Registers that tell what it was made with.
-        settings: Its configuration.
-        gear_ratio: True turns of the rotor per turn of the output.
-        brake: Damping of the output with the phases shorted, N m s/rad.
-        voltage: Bus voltage, V.
+    ``identity`` are the registers that tell what it was made with. The gear ratio is the true one,
+    ``brake`` the output's damping with the phases shorted, N m s/rad, the voltage the bus's, V.
     """
 
     def __init__(

@@ -107,15 +107,10 @@ class Delivery:
 
 
 class FaultKind:
-    """A fault at work; a subclass says what it does.
+    """A fault at work; a subclass says what it does, by default how much and how long.
 
-    Attributes:
-        text: What happens.
-        unit: Unit of the fault's value; empty if it has none.
-        value: Default value.
-        duration: Default duration, s; NaN where a number of replies is meant.
-        at_start: Whether the robot starts with it, whatever the script says of its time.
-        rises: Whether the value is a rate, at which its level rises.
+    The duration is in s, NaN where a number of replies is meant. One ``at_start`` is there from the
+    beginning, whatever the script says of its time; the value of one that ``rises`` is a rate.
     """
 
     text: ClassVar[str]

@@ -20,15 +20,10 @@ TIMESTEP = 5e-4  # Period of the drives' control, s; the physics steps more ofte
 
 
 class EmulatedLeg:
-    """One leg, stepped by one physics step at a time.
+    """One leg, stepped by one physics step at a time, from joint angles, rad, (2,), on the ground.
 
-    Its sensors have ``STANDING_NOISE`` where the robot's file names no noise: no real one is
-    without.
-
-    Args:
-        robot: What is simulated; its ``reality`` holds.
-        q: Joint angles at the start, rad, (2,); the foot stands on the ground.
-        seed: Seed of sensor noise.
+    What the robot's ``reality`` says holds; where that names no noise of a sensor it has
+    ``STANDING_NOISE``, as no real one is without. All noise follows from the seed.
     """
 
     def __init__(self, robot: Robot, q: Array, seed: int) -> None:

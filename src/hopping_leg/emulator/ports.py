@@ -14,11 +14,7 @@ from hopping_leg.errors import UsageError
 
 
 class LineProtocol:
-    """The adapter's side of one connection.
-
-    Attributes:
-        checksums: Whether lines carry checksums: since the host sent one, all must.
-    """
+    """The adapter's side of one connection; since the host sent a checksum, all lines have one."""
 
     def __init__(self) -> None:
         self._lines = LineBuffer()

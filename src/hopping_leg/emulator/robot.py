@@ -41,13 +41,7 @@ class Observer(Protocol):
 
 
 class EmulatedRobot:
-    """Leg and drives, moved by ``advance`` and ``receive``.
-
-    Args:
-        robot: What stands behind the wire; its ``reality`` holds.
-        q: Joint angles at the start, rad, (2,).
-        configured, homed, held, seed, faults: See ``EmulatorConfig``.
-    """
+    """Leg and drives from joint angles, rad, (2,), moved by ``advance`` and ``receive``."""
 
     def __init__(
         self,
@@ -175,10 +169,8 @@ def _drive(robot: Robot, joint: int, configured: bool) -> EmulatedDrive:
 class FaultInjector:
     """When the faults of one robot begin and end, and what becomes of replies meanwhile.
 
-    Attributes:
-        log: Which fault began when, s.
-        powered: When both drives were powered for the first time, s.
-        flown: When the foot left the ground for the first time, s.
+    ``log`` tells which fault began when, ``powered`` when both drives were powered for the first
+    time, and ``flown`` when the foot then left the ground first, s.
     """
 
     def __init__(

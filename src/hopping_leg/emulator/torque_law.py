@@ -49,8 +49,7 @@ TORQUE_CONSTANT = 0.0275
 class TorqueLaw:
     """The position controller of one drive and the limits behind it.
 
-    Attributes:
-        notice: Limit that was at work since it was last reset, 0 if none.
+    ``notice`` is the limit that was at work since it was last reset, 0 if none.
     """
 
     def __init__(self, settings: Settings) -> None:

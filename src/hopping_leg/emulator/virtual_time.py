@@ -23,11 +23,8 @@ _WIRE_TIME = 5e-4
 class Lockstep:
     """The clock that moves an emulated robot, and the link to it.
 
-    The lines have checksums, or none as a plain fdcanusb's.
-
-    Attributes:
-        truth: Time, s, base height and the foot's clearance, m, and the angles of hip and knee,
-            rad, at every tick.
+    The lines have checksums, or none as a plain fdcanusb's. ``truth`` is time, s, base height and
+    the foot's clearance, m, and the angles of hip and knee, rad, at every tick.
     """
 
     def __init__(self, robot: EmulatedRobot, *, checksums: bool = True) -> None:

@@ -107,10 +107,7 @@ class HoppingEnv(_TaskView, gymnasium.Env[Array32, Array32]):
     and ``apex_error`` (its height above the command), m.
 
     The robot may be a name or the path of a TOML file; the reward, of which the environment takes a
-    copy, is the paper's if None; the render mode is ``"rgb_array"`` or None.
-
-    Raises:
-        UsageError: The render mode is unknown.
+    copy, is the paper's if None; the render mode is ``"rgb_array"`` or None, else a UsageError.
     """
 
     def __init__(
@@ -219,11 +216,7 @@ class HoppingVectorEnv(_TaskView, gymnasium.vector.VectorEnv[Array32, Array32, A
         return seen, self._masked(standing, ~self._ended)
 
     def step(self, actions: Array32) -> tuple[Array32, Array, BoolArray, BoolArray, dict[str, Any]]:
-        """Act for one control period in every leg; actions are (n, 2).
-
-        Raises:
-            UsageError: Actions are not finite or of another shape.
-        """
+        """Act for one control period; UsageError refuses actions not finite or not (n, 2)."""
         step = self.task.step(np.asarray(actions))
         seen, reward = step.observation, step.reward
         terminated, truncated = step.terminated.copy(), step.truncated.copy()

@@ -20,8 +20,7 @@ _MOST_ERROR = 0.3
 class HiddenState:
     """Height and contact, the last hop's error, and how the legs differ from what is told of them.
 
-    Attributes:
-        size: How many numbers.
+    ``size`` is how many numbers these are.
     """
 
     def __init__(self, legs: LegSimulator, believed: Sequence[Robot]) -> None:

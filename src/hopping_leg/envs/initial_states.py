@@ -29,10 +29,8 @@ def standing_length(robot: Robot) -> float:
 class InitialStates:
     """Draws initial states: standing, or dropped in a random posture.
 
-    ``believed`` is what is told of each leg, ``geometry`` the legs'.
-
-    Raises:
-        RobotError: The robot is no leg, or cannot fold to the length in which it stands.
+    ``believed`` is what is told of each leg, ``geometry`` the legs'. RobotError says that the robot
+    is no leg, or cannot fold to the length in which it stands.
     """
 
     def __init__(

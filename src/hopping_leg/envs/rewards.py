@@ -94,8 +94,7 @@ class RewardTerm(NamedTuple):
 class Reward:
     """The weighted sum of a list of k terms, scaled for the critic's sake.
 
-    Raises:
-        UsageError: Two terms have the same name.
+    UsageError says that two terms have the same name.
     """
 
     def __init__(self, terms: Sequence[RewardTerm], scale: float = 1.0) -> None:

@@ -179,8 +179,7 @@ class HoppingTask:
     def step(self, action: Array | Array32) -> Step:
         """Act for a period; actions are torques over ``action_torque`` in [-1, 1], (n, 2).
 
-        Raises:
-            UsageError: Actions are not finite or of another shape; nothing has moved.
+        UsageError refuses what is not finite or of another shape; nothing has moved.
         """
         legs = self.legs
         taken, torque = np.array(action, np.float64), self._torque

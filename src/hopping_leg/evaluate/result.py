@@ -119,10 +119,8 @@ Windows = dict[float, list[tuple[Run, metrics.HopWindow]]]
 def tabulate(runs: Sequence[Run], seed: int, robot: Robot | None = None) -> Evaluation:
     """Measure runs and arrange the numbers; conditions, versions and notes stay empty.
 
-    Args:
-        runs: Runs of all controllers, which come in the order of the rows.
-        seed: Seed of the bootstrap.
-        robot: The leg of all runs; without it nothing is told of its motors.
+    Controllers come in the order of their runs; the seed is the bootstrap's. Without the robot of
+    all runs nothing is told of its motors.
     """
     measured = [(run, window) for run in runs for window in metrics.measure(run.trace)]
     measured.sort(key=lambda pair: pair[1].command)

@@ -114,19 +114,12 @@ def evaluate(
     robots: Sequence[Robot] = (),
     on_progress: Callable[[str, float], None] = lambda _label, _share: None,
 ) -> EvaluationRun:
-    """Run all trials of all entries and measure them.
+    """Run all trials of some kinds of all entries, on a floor of ``FLOORS``, and measure them.
 
-    Args:
-        entries: What is judged.
-        setup: The world; its robot stands on ``floor``.
-        commands: Heights of the fixed trials and the sequence, m; the paper's by default.
-        repeats: Realisations of noise and delay per trial.
-        seed: All of them follow from it.
-        floor: One of ``FLOORS``.
-        kinds: Which kinds of trial to run.
-        robots: What the leg may be, whatever controllers believe: each hops once in every trial,
-            in place of ``repeats``, which predicts how a leg hops.
-        on_progress: Called with a label and the share done of its runs.
+    Commands are heights of the fixed trials and the sequence, m; the paper's by default. A trial
+    has ``repeats`` realisations of noise and delay, which follow from the seed; where ``robots``
+    are given, what the leg may be whatever controllers believe, each hops once instead, which
+    predicts how a leg hops. ``on_progress`` is called with a label and the share done of its runs.
 
     Raises:
         UsageError: A command is out of reach or out of an entry's range, a name is taken twice,

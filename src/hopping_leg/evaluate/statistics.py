@@ -29,11 +29,8 @@ def bootstrap(
 ) -> Array:
     """Return 95 % percentile intervals of a statistic, (2,) or (2, values); units are resampled.
 
-    Args:
-        units: What was drawn independently: runs, twins, policies, each with all of its values.
-        statistic: Number, or several, of a list of units.
-        seed: Of the resampling.
-        least: Units below which the interval is unknown, NaN.
+    Units are what was drawn independently: runs, twins, policies, each with all of its values. The
+    statistic of a list of them is a number, or several; of less than ``least`` it is unknown, NaN.
     """
     if len(units) < least:
         return np.full((2, *np.shape(statistic(list(units)))), np.nan)
@@ -92,14 +89,9 @@ class Neighbours:
 def compare(
     lower_m: float, lower: Sequence[Array], upper_m: float, upper: Sequence[Array], seed: int
 ) -> Neighbours:
-    """Compare the apexes of two commands, m.
+    """Compare the apexes, m, (hops,), of each run at two commands, m.
 
-    Args:
-        lower_m: The lower command, m.
-        lower: Apexes of each run at it, m, (hops,) each.
-        upper_m: The higher command, m.
-        upper: The same, each run beside the one that it is compared with.
-        seed: Of the bootstrap.
+    Runs of ``upper`` stand beside those that they are compared with; the seed is the bootstrap's.
     """
     pairs = [(a, b) for a, b in zip(lower, upper, strict=True) if len(a) and len(b)]
     if not pairs:

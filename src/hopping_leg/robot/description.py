@@ -40,9 +40,8 @@ class Point(NamedTuple):
 class Description:
     """What a file says; bodies and joints by their numbers in MuJoCo's ``model``.
 
-    Raises:
-        RobotError: The file is neither URDF nor MJCF, MuJoCo refuses it, or a body's mass is that
-            of a mesh.
+    RobotError says that the file is neither URDF nor MJCF, that MuJoCo refuses it, or that a body's
+    mass is that of a mesh.
     """
 
     def __init__(self, path: Path) -> None:

@@ -200,30 +200,14 @@ def act(
     first: int, last: int, tries: int, tolerance: float, every: int, period: float,
     air_steps: int, ticks: int,
 ) -> None:  # fmt: skip
-    """Set phases and torques of legs; plan those that push.
+    """Set phases, (n,), and torques, N m, (n, 2), of some legs; plan the hops of those that push.
 
-    The push-off force is the one whose simulated apex is the command, found by regula falsi.
-
-    Args:
-        ground: Rows of the planning model on the ground, (n,).
-        air: Rows of the same in the air, (n,).
-        shapes: The shape of all hops, (1,).
-        state: States, (n, 6).
-        memory: What the legs remember, (n,) of ``MEMORY``.
-        phases: Phase of each leg, (n,); set.
-        commands: Apex heights, m, (n,).
-        hops: Numbers of the hops, (n,); set.
-        torques: What to command, N m, (n, 2); set.
-        scratch: Two records of memory per thread; those from twice ``first`` on are used.
-        steps: Physics steps per control period on the ground, (n,).
-        first: First leg.
-        last: Leg before which to stop.
-        tries: Simulations per plan at most.
-        tolerance: Error of the apex that is good enough, m.
-        every: Control periods between two plans of a push.
-        period: Control period, s.
-        air_steps: Physics steps per control period in the air.
-        ticks: Control periods of a simulation at most.
+    The push-off force is the one whose simulated apex is the command, m, (n,), found by regula
+    falsi in as many ``tries`` at most, each of so many ``ticks`` at most; an error of
+    ``tolerance``, m, is good enough. A push is planned anew ``every`` so many control periods.
+    Rows of the planning model, (n,), differ on the ``ground``, with ``steps`` physics steps per
+    control period, s, and in the ``air``, with ``air_steps``. ``scratch`` has two records of memory
+    per thread; those from twice ``first`` on are used.
     """
     rows, past = np.empty(SCRATCH), np.empty((0, 6))
     command, here, there, torque = np.zeros(COMMAND), np.empty(6), np.empty(6), np.empty(2)

@@ -97,13 +97,8 @@ _SHAPE = np.dtype([(field.name, np.float64) for field in fields(HopShape)])
 class TrueStateMpc:
     """Controls simulated legs whose true state it sees: what a perfect estimate would be worth.
 
-    Plans are on the leg's true parameters. Legs that differ are planned for each as it is.
-
-    Args:
-        robot: The leg.
-        shape: What hops are like.
-        planning: How they are simulated.
-        rate: Control rate, Hz.
+    Plans are on the leg's true parameters, at a control rate in Hz. Legs that differ are planned
+    for each as it is.
     """
 
     name = "mpc-true-state"
