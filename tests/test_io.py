@@ -104,7 +104,7 @@ def test_a_trace_survives_its_file_and_saved_again_has_the_same_bytes(tmp_path):
 
 
 def test_missing_foreign_and_cut_files_are_refused_in_a_sentence(tmp_path):
-    with pytest.raises(TraceError, match="There is no trace file"):
+    with pytest.raises(TraceError, match="Cannot read the trace"):
         Trace.load(tmp_path / "none.parquet")
     path = tmp_path / "run.parquet"
     pl.DataFrame({"a": [1]}).write_parquet(path)

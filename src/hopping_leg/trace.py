@@ -89,8 +89,6 @@ class Trace:
         """Read a trace; TraceError where it is missing, truncated, foreign or of another schema."""
         try:
             content = path.read_bytes()
-        except FileNotFoundError as error:
-            raise TraceError(f"There is no trace file {path}.") from error
         except OSError as error:
             raise TraceError(f"Cannot read the trace {path}: {error.strerror}.") from error
         return Trace.of(*read_parquet(content, str(path), TraceError), path)

@@ -12,7 +12,7 @@ from hopping_leg.controllers.fallback import with_fallback
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.drive_info import home, inspect
-from hopping_leg.deploy.hardware_trials import Performance, header_of, perform
+from hopping_leg.deploy.hardware_trials import Performance, perform
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
 from hopping_leg.deploy.preflight import check_drives, require_fit
@@ -167,14 +167,11 @@ class Scene:
             HardwareError: The drives may not be armed.
             KeyboardInterrupt: A signal stopped the leg.
         """
-        controller = load_controller(self.case.controller, self.robot)
-        sequence = self._sequence(controller)
+        sequence = self._sequence(load_controller(self.case.controller, self.robot))
         self.require_fitness(link)
-        header, file = header_of(self.robot, controller, CONTROL_RATE), folder / "run.parquet"
-        real = clock is None
         done = perform(
-            link, sequence, self.safety_limits, file, header, clock=clock, realtime=real,
-            threaded=real or self.mishap.dies,
+            link, sequence, self.safety_limits, folder / "run.parquet", clock=clock,
+            threaded=self.mishap.dies,
         )  # fmt: skip
         memory = done.outcome.supervisor
         if Reason.OPERATOR_STOP in (memory.cause.reason, memory.stop_cause.reason):

@@ -17,7 +17,7 @@ from hopping_leg.cli.options import JsonFile, RobotFile, say
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.deploy.hardware_trials import Performance, header_of, perform
+from hopping_leg.deploy.hardware_trials import Performance, perform
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.realtime import Clock, RealClock, keeping_time
@@ -118,15 +118,9 @@ class Deploy:
             controller, schedule, hopping_poses(robot), SoftLimiter(robot, SoftLimits()),
             SequenceTiming(hop=schedule.seconds),
         )  # fmt: skip
-        limits, header = (
-            hopping_limits(robot, CONTROL_RATE),
-            header_of(robot, controller, CONTROL_RATE),
-        )
+        limits = hopping_limits(robot, CONTROL_RATE)
         with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "run.parquet"
-            return perform(
-                link, sequence, limits, path, header, clock=clock, realtime=clock is None
-            )
+            return perform(link, sequence, limits, Path(folder) / "run.parquet", clock=clock)
 
 
 def _bare_wake_ups(seconds: float) -> dict[str, float]:

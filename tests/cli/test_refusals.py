@@ -40,7 +40,7 @@ REFUSED = [
     ("doctor --transport /none/port", "There is no serial port /none/port"),
     ("doctor --transport socketcn:can0", "python-can has no interface 'socketcn'"),
     ("emulate --seconds 0 --start-pose x", "There is no pose 'x'"),
-    ("emulate --seconds 0 --faults none.toml", "Cannot read the fault script none.toml"),
+    ("emulate --seconds 0 --faults none.toml", "Could not use none.toml"),
     ("record play", "No excitation was given"),
     ("record play sine.parquet --believed legv9", "There is no robot 'legv9'"),
     ("record play sine.parquet --damping -1 0", "must be zero or more"),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers import RolloutConfig, rollout
-from hopping_leg.controllers.command_schedule import CommandSchedule, check_schedule, command_range
+from hopping_leg.controllers.command_schedule import CommandSchedule, check_heights, command_range
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.rollout import Perturbation
 from hopping_leg.errors import PhysicsError, UsageError
@@ -88,10 +88,10 @@ def test_a_policy_is_asked_for_what_it_was_trained_for_and_others_for_what_the_l
     policy = load_controller("fast", LEG)
     low, high = command_range(policy, LEG)
     assert (low, high) == (policy.card.command_low, policy.card.command_high)
-    check_schedule(CommandSchedule(((low, 1.0), (high, 1.0))), (low, high), "fast")
+    check_heights([low, high], (low, high), "fast")
     for height in (low - 0.01, high + 0.01, math.nan):
-        with pytest.raises(UsageError, match="outside of what fast"):
-            check_schedule(CommandSchedule(((height, 1.0),)), (low, high), "fast")
+        with pytest.raises(UsageError, match="'fast' cannot be asked"):
+            check_heights([height], (low, high), "fast")
     assert command_range(load_controller("energy-shaping", LEG), LEG) == command_limits(LEG)
 
 

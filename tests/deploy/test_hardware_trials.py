@@ -15,7 +15,7 @@ from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.drive_info import home, inspect
 from hopping_leg.deploy.drive_link import BRAKE
-from hopping_leg.deploy.hardware_trials import header_of, perform
+from hopping_leg.deploy.hardware_trials import perform
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.preflight import check_drives, require_fit
 from hopping_leg.deploy.safety_limits import hopping_limits
@@ -59,8 +59,7 @@ def run(lockstep, path, controller="energy-shaping", *, hop=0.5, rise=0.5, check
         SequenceTiming(hop=hop, rise=rise, settle=0.2, sink=0.6),
         checked=checked,
     )
-    limits, header = hopping_limits(leg, 200.0), header_of(leg, controller, 200.0)
-    return perform(lockstep.link, sequence, limits, path, header, clock=lockstep, realtime=False)
+    return perform(lockstep.link, sequence, hopping_limits(leg, 200.0), path, clock=lockstep)
 
 
 @pytest.mark.parametrize("homed", ["hanging", "standing"])
@@ -186,15 +185,14 @@ class Clock(FakeClock):
 def fake_run(tmp_path, controller):
     clock = Clock()
     link = FakeLink(clock)
-    link.trouble = ""
+    link.trouble, link.robot = "", LEG
     sequence = MotionSequence(
         controller, CommandSchedule(((0.3, 100.0),)), POSES, SoftLimiter(LEG, SoftLimits()), SHORT
     )
-    header = header_of(LEG, controller, 200.0)
     limits, file = hopping_limits(load_robot("legv2"), 200.0), tmp_path / "run.parquet"
 
     def run():
-        return perform(link, sequence, limits, file, header, clock=clock, realtime=False)
+        return perform(link, sequence, limits, file, clock=clock)
 
     return link, clock, run
 

@@ -81,7 +81,7 @@ def robustness(entries, setup, commands, repeats=1):
         ("", {}, "No controller"),
         ("aa", {}, "named twice"),
         ("a", {"repeats": 0}, "0 seeds are too few"),
-        ("a", {"commands": [0.3, float("nan")]}, "out of reach"),
+        ("a", {"commands": [0.3, float("nan")]}, "cannot be asked for nan m"),
         ("a", {"commands": [0.25, 0.35]}, r"'a' cannot be asked for 0\.35 m.*0\.2 to 0\.3 m"),
     ],
 )

@@ -154,7 +154,7 @@ def test_what_cannot_be_replayed_is_refused_and_an_unknown_robot_asks_for_its_fi
         ReplaySource((path,))
     with pytest.raises(UsageError, match="one, or two"):
         ReplaySource((path,) * 3)
-    with pytest.raises(TraceError, match="no trace file"):
+    with pytest.raises(TraceError, match="Cannot read the trace"):
         ReplaySource((tmp_path / "none.parquet",))
     with pytest.raises(RobotError, match="cannot hop"):
         ReplaySource((stored(tmp_path / "p.parquet", robot="doublependulum"),))

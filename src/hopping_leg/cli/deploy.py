@@ -113,7 +113,7 @@ def _plan(
         middle = sum(valid) / 2 if isinstance(controller, policy.Policy) else 0.30
         height = middle if args.command is None else args.command
         schedule = command_schedule.CommandSchedule(((height, _SECONDS),))
-    command_schedule.check_schedule(schedule, valid, controller.name)
+    command_schedule.check_heights([h for h, _ in schedule.steps], valid, controller.name)
     seconds = args.seconds or (_SECONDS if args.schedule is None else schedule.seconds)
     if not 0 < seconds <= 3600:
         raise UsageError(f"--seconds is {seconds:g} but must lie between 0 and 3600.")
@@ -149,9 +149,8 @@ def _perform(
             " keep a hand on the switch.",
             yes=args.yes,
         )
-        facts = {"transport": args.transport, "drives": drives}
-        header = hardware_trials.header_of(robot, controller, CONTROL_RATE, **facts)
         return hardware_trials.perform(
-            link, sequence, limits, hardware_trials.new_path(args.out, name), header,
+            link, sequence, limits, hardware_trials.new_path(args.out, name),
+            facts={"transport": args.transport, "drives": drives},
             beside=lambda loop: keyboard.keys(height, loop.stop, options.say),
         )  # fmt: skip

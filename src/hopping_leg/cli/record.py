@@ -242,11 +242,9 @@ def _measured(
                 motion_sequence.SequenceTiming(hop=seconds),
                 gains,
             )
-            facts = {"transport": transport, "drives": drives}
-            header = hardware_trials.header_of(robot, controller, rate, **facts)
-            path = hardware_trials.new_path(args.out / "traces", name)
             done = hardware_trials.perform(
-                link, sequence, limits, path, header,
+                link, sequence, limits, hardware_trials.new_path(args.out / "traces", name),
+                facts={"transport": transport, "drives": drives},
                 beside=lambda loop: keyboard.keys(None, loop.stop, say),
             )  # fmt: skip
             say(*done.notices)

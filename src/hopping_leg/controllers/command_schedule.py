@@ -1,6 +1,7 @@
 """Which height is commanded when, and which heights a controller can be asked for."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -72,12 +73,16 @@ def command_range(controller: protocol.Controller, robot: Robot) -> Range:
     return command_limits(robot)
 
 
-def check_schedule(schedule: CommandSchedule, valid: Range, name: str) -> None:
-    """Refuse heights out of a controller's range by a UsageError that names height and range."""
-    slack = 1e-9
-    for height, _ in schedule.steps:
-        if not valid[0] - slack <= height <= valid[1] + slack:
+def within(height: float, valid: Range) -> bool:
+    """Tell whether a height, m, is in a range, but for rounding."""
+    return valid[0] - 1e-9 <= height <= valid[1] + 1e-9
+
+
+def check_heights(heights: Iterable[float], valid: Range, name: str) -> None:
+    """Refuse heights, m, out of the range of a controller or robot by a UsageError."""
+    for height in heights:
+        if not within(height, valid):
             raise UsageError(
-                f"A command of {height:g} m is outside of what {name} can be asked for; give"
-                f" heights from {valid[0]:.2f} to {valid[1]:.2f} m."
+                f"'{name}' cannot be asked for {height:g} m; give heights from {valid[0]:.4g} to"
+                f" {valid[1]:.4g} m."
             )

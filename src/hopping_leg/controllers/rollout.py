@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -80,18 +80,6 @@ class Perturbation:
         return ground + rise
 
 
-@runtime_checkable
-class PrivilegedController(Protocol):
-    """A controller that looks at the simulated legs themselves, and may place them elsewhere.
-
-    It is for studies, never for a robot.
-    """
-
-    def watch(self, legs: LegSimulator) -> None:
-        """Take the legs, live; called before their first tick."""
-        ...
-
-
 @dataclass(frozen=True)
 class Rollout:
     """Recorded runs of n legs."""
@@ -118,18 +106,15 @@ def rollout(
     perturbation: Perturbation | None = None,
     legs: LegSimulator | None = None,
 ) -> Rollout:
-    """Let a controller hop from a standing start; a ``PrivilegedController`` is shown the legs.
+    """Let a controller hop from a standing start; return a row per control period.
 
-    It is asked for desired heights, m, (ticks, n); noise and delay follow from the seed.
-    ``on_tick`` is called with (ticks done, ticks in all). A perturbation changes legs in ways that
-    ``config`` does not know: recorded heights are above the ground of the moment, recorded commands
-    are the controller's. ``legs`` hop instead of what ``config`` describes.
-
-    Returns:
-        One row per control period: the state at its start and the torques during it.
-
-    Raises:
-        PhysicsError: The simulation became unstable.
+    A row is the state at its start and the torques during it. Desired heights are in m, (ticks, n);
+    noise and delay follow from the seed; ``on_tick`` is called with (ticks done, ticks in all). A
+    perturbation changes legs in ways that ``config`` does not know: recorded heights are above the
+    ground of the moment, recorded commands are the controller's. ``legs`` hop instead of what
+    ``config`` describes. A controller of a study, never of a robot, may have a method ``watch``: it
+    gets the legs, live, and may place them elsewhere. PhysicsError says that the simulation became
+    unstable.
     """
     ticks, count = commands.shape
     if legs is None:
@@ -141,7 +126,7 @@ def rollout(
     legs.stand(slice(None), config.start_posture)
     plant.channel.restart(slice(None), legs.q, legs.qd, commands[0])
     controller.reset(count)
-    if isinstance(controller, PrivilegedController):
+    if hasattr(controller, "watch"):
         controller.watch(legs)
     data = np.empty((len(_COLUMNS), ticks, count))
     internals, ground = dict[str, Array](), np.zeros(count)

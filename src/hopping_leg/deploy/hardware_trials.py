@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from hopping_leg import flight_recording
 from hopping_leg.controllers import protocol
+from hopping_leg.controllers.fallback import Fallback
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.deploy import drive_link, flight_recorder, safety_limits, stop_reasons, supervisor
 from hopping_leg.deploy.loop import ControlLoop, LoopOutcome, columns
@@ -65,27 +66,29 @@ def perform(
     sequence: MotionSequence,
     limits: safety_limits.SafetyLimits,
     path: Path,
-    header: dict[str, Any],
     *,
+    facts: dict[str, Any] | None = None,
     clock: Clock | None = None,
-    realtime: bool = True,
-    threaded: bool = True,
+    threaded: bool = False,
     beside: Callable[[ControlLoop], AbstractContextManager[None]] = lambda _: nullcontext(),
 ) -> Performance:
     """Arm, run a sequence, stop; a signal stops it as the operator would, a second one ends it.
 
     The drives behind the link were found fit. The flight recording lies beside ``path``, the
-    trace's, until that is complete. Without ``clock`` time is the computer's. ``realtime`` asks for
-    priority and locked memory, ``threaded`` records in a thread, see ``FlightRecorder``; ``beside``
-    makes what is open while the loop runs, e.g. a keyboard that stops it.
+    trace's, until that is complete; its header holds the facts, too. Without a clock time is the
+    computer's, which asks for priority and locked memory and records in a thread, see
+    ``FlightRecorder``. ``beside`` makes what is open while the loop runs, e.g. a keyboard that
+    stops it.
 
     Raises:
         TraceError: The flight recording cannot be created, or the trace cannot be written.
         HardwareError: The controller did not return, or a second signal ended the run.
     """
+    controller, rate, real = sequence.controller, 1 / limits.period, clock is None
     recording = path.with_suffix(flight_recording.SUFFIX)
+    header = {**_header(link.robot, controller, rate), **(facts or {})}
     recorder = flight_recorder.FlightRecorder(
-        recording, columns(sequence.controller), header, threaded=threaded
+        recording, columns(controller), header, threaded=threaded or real
     )
     loop = ControlLoop(link, sequence, limits, recorder, clock or RealClock())
     notices: tuple[str, ...] = ()
@@ -93,14 +96,14 @@ def perform(
         with (
             _stop_signals(loop) as signals,
             beside(loop),
-            keeping_time(realtime=realtime) as notices,
+            keeping_time(realtime=real) as notices,
         ):
             outcome = _run(loop, signals, recording)
     finally:
         if link.trouble:
             recorder.event(link_trouble=link.trouble)
         recorder.close()
-    share, rate = outcome.ticks / max(outcome.ticks + outcome.skipped, 1), 1 / limits.period
+    share = outcome.ticks / max(outcome.ticks + outcome.skipped, 1)
     if share < _FULL_RATE:
         sentence = (
             f"The loop ran at {rate * share:.0f} instead of {rate:g} Hz: this computer was late;"
@@ -179,13 +182,10 @@ def _finish(
     return Performance(outcome, trace, path, notices, complaint)
 
 
-def header_of(
-    robot: Robot,
-    controller: protocol.Controller,
-    rate: float,
-    **facts: Any,  # noqa: ANN401
-) -> dict[str, Any]:
+def _header(robot: Robot, controller: protocol.Controller, rate: float) -> dict[str, Any]:
     """Return a trace's header: what ran on what, and what its codes mean."""
+    if isinstance(controller, Fallback):
+        controller = controller.policy
     policy = {"policy_digest": controller.digest} if isinstance(controller, Policy) else {}
     return {
         "robot": robot.name,
@@ -200,7 +200,6 @@ def header_of(
             name: {str(member.value): member.name.lower() for member in kind}
             for name, kind in _CODES.items()
         },
-        **facts,
     }
 
 

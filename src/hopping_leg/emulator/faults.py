@@ -437,12 +437,8 @@ class _Configuration(FaultKind, kind="configuration"):
 
 
 def load_faults(path: Path) -> tuple[Fault, ...]:
-    """Read a script, or raise UsageError where it is missing, no TOML, or has no meaning."""
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise UsageError(f"Cannot read the fault script {path}: {error.strerror}.") from error
-    tree = parse_toml(content, str(path))
+    """Read a script, or raise UsageError where it is no TOML or has no meaning."""
+    tree = parse_toml(path.read_bytes(), str(path))
     entries = tree.pop("fault", None)
     if tree or not isinstance(entries, list):
         raise UsageError(f"{path} must hold tables [[fault]] and nothing else.")

@@ -1,24 +1,15 @@
 """The learning problem: observation, reward, reset, as a Gymnasium env and vector env."""
 
-from hopping_leg.envs.apex_reward import ApexRewardConfig, apex_reward
-from hopping_leg.envs.gymnasium_envs import HoppingEnv, HoppingVectorEnv
-from hopping_leg.envs.paper_reward import PaperRewardConfig, paper_reward
-from hopping_leg.envs.rewards import LastingTerm, Reward, RewardTerm, Transition
-from hopping_leg.envs.task import HoppingTask, TaskLeg
-from hopping_leg.envs.task_config import TaskConfig
-
-__all__ = [
-    "ApexRewardConfig",
-    "HoppingEnv",
-    "HoppingTask",
-    "HoppingVectorEnv",
-    "LastingTerm",
-    "PaperRewardConfig",
-    "Reward",
-    "RewardTerm",
-    "TaskConfig",
-    "TaskLeg",
-    "Transition",
-    "apex_reward",
-    "paper_reward",
-]
+from hopping_leg.envs.apex_reward import ApexRewardConfig as ApexRewardConfig
+from hopping_leg.envs.apex_reward import apex_reward as apex_reward
+from hopping_leg.envs.gymnasium_envs import HoppingEnv as HoppingEnv
+from hopping_leg.envs.gymnasium_envs import HoppingVectorEnv as HoppingVectorEnv
+from hopping_leg.envs.paper_reward import PaperRewardConfig as PaperRewardConfig
+from hopping_leg.envs.paper_reward import paper_reward as paper_reward
+from hopping_leg.envs.rewards import LastingTerm as LastingTerm
+from hopping_leg.envs.rewards import Reward as Reward
+from hopping_leg.envs.rewards import RewardTerm as RewardTerm
+from hopping_leg.envs.rewards import Transition as Transition
+from hopping_leg.envs.task import HoppingTask as HoppingTask
+from hopping_leg.envs.task import TaskLeg as TaskLeg
+from hopping_leg.envs.task_config import TaskConfig as TaskConfig

@@ -72,7 +72,8 @@ class _TaskView:
         renderer.update_scene(data, camera="side")
         return renderer.render()
 
-    def _close_stage(self) -> None:
+    def close_extras(self, **kwargs: Any) -> None:  # noqa: ANN401
+        """Free the renderer."""
         if "_stage" in vars(self):
             self._stage[0].close()
             del self._stage
@@ -152,7 +153,7 @@ class HoppingEnv(_TaskView, gymnasium.Env[Array32, Array32]):
 
     def close(self) -> None:
         """Free the renderer."""
-        self._close_stage()
+        self.close_extras()
 
 
 class HoppingVectorEnv(_TaskView, gymnasium.vector.VectorEnv[Array32, Array32, Any]):
@@ -262,7 +263,3 @@ class HoppingVectorEnv(_TaskView, gymnasium.vector.VectorEnv[Array32, Array32, A
         if self.render_mode is None:
             return None
         return tuple(self._picture(leg).copy() for leg in range(self.num_envs))
-
-    def close_extras(self, **kwargs: Any) -> None:  # noqa: ANN401
-        """Free the renderer."""
-        self._close_stage()

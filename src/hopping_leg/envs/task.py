@@ -184,7 +184,11 @@ class HoppingTask:
         legs = self.legs
         taken, torque = np.array(action, np.float64), self._torque
         if taken.shape != torque.shape or not _clip(taken, self.full_torque, torque):
-            self._refuse(taken)
+            raise errors.UsageError(
+                "Actions are torques of hip and knee over the full action's, finite numbers from"
+                f" -1 to 1 in the shape ({self.count}, 2), not {taken.tolist()!r:.60} in"
+                f" {taken.shape}."
+            )
         command, height_before = self.command.copy(), legs.height.copy()
         self.applied_torque = self.plant.drive(torque)
         self._columns[:] = legs.state.T
@@ -196,12 +200,6 @@ class HoppingTask:
         reward, terms = self.reward(transition)
         self.last_action = taken
         return self._next(reward, terms, command, apex_error, transition.apex_height)
-
-    def _refuse(self, action: Array) -> NoReturn:
-        raise errors.UsageError(
-            "Actions are torques of hip and knee over the full action's, finite numbers from -1 to"
-            f" 1 in the shape ({self.count}, 2), not {action.tolist()!r:.60} in {action.shape}."
-        )
 
     def __reduce__(self) -> NoReturn:
         """Refuse copies, whose arrays would no longer share what they must."""
@@ -235,10 +233,8 @@ class HoppingTask:
         out[:, 2:4] = (legs.q - offset[:2]) * gain[:2]
         out[:, 4:6] = legs.qd * gain[2:4]
         out[:, 6] = (self.command - offset[4]) * gain[4]
-        for column, clearance in enumerate(
-            (legs.foot_clearance, legs.knee_clearance, legs.base_clearance), start=7
-        ):
-            out[:, column] = clearance() * _CLEARANCE_GAIN
+        gaps = legs.foot_clearance(), legs.knee_clearance(), legs.base_clearance()
+        out[:, 7:_PRIVILEGED] = np.stack(gaps, axis=1) * _CLEARANCE_GAIN
         out[:, _PRIVILEGED:] = self._numbers
         return out
 

@@ -89,9 +89,7 @@ def _rate(trace: Trace) -> float:
 
 def skipped_in_run(trace: Trace) -> int:
     """Count skipped hops of a whole run after its start, switches of command included."""
-    rate = _rate(trace)
-    height, velocity, clearance = map(trace.column, COLUMNS)
-    return measure_hops(height, velocity, clearance, rate, round(START_SECONDS * rate)).skipped
+    return _window(trace, 0, len(trace.table), _rate(trace), START_SECONDS).skipped
 
 
 def errors_of(windows: Sequence[HopWindow]) -> list[Array]:

@@ -2,7 +2,6 @@
 
 import functools
 import glob
-import math
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.controllers import Controller, RolloutConfig
+from hopping_leg.controllers.command_schedule import check_heights, within
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import PolicyError, UsageError
@@ -37,8 +37,8 @@ class Entry:
 
     def reaches(self, heights: Iterable[float]) -> bool:
         """Tell whether it was made for all of some heights, m."""
-        low, high = self.command_range or (-math.inf, math.inf)
-        return all(low - 1e-9 <= height <= high + 1e-9 for height in heights)
+        valid = self.command_range
+        return valid is None or all(within(height, valid) for height in heights)
 
 
 def load_entries(names: Sequence[str], robot: Robot, rate: float) -> list[Entry]:
@@ -64,13 +64,8 @@ def check_entries(entries: Sequence[Entry], commands: Sequence[float]) -> None:
     for entry in entries:
         if labels.count(entry.label) > 1:
             raise UsageError(f"Controller '{entry.label}' was named twice; name each one once.")
-        for height in commands:
-            if entry.command_range and not entry.reaches([height]):
-                low, high = entry.command_range
-                raise UsageError(
-                    f"'{entry.label}' cannot be asked for {height:g} m: it was trained for"
-                    f" {low:g} to {high:g} m; choose --commands within that range."
-                )
+        if entry.command_range:
+            check_heights(commands, entry.command_range, entry.label)
 
 
 def _expand(text: str) -> list[tuple[str, str]]:

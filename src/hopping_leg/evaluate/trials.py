@@ -9,7 +9,7 @@ import polars as pl
 
 from hopping_leg import errors, io
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
-from hopping_leg.controllers.command_schedule import CommandSchedule
+from hopping_leg.controllers.command_schedule import CommandSchedule, check_heights
 from hopping_leg.evaluate.metrics import stretches
 from hopping_leg.flight_recording import load_trace
 from hopping_leg.robot import GroundMismatch, Robot, command_limits
@@ -69,17 +69,11 @@ def choose_commands(
         raise errors.UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
     if commands is None:
         return scaled(COMMANDS, robot)
-    low, high = command_limits(robot)
     if not commands:
         raise errors.UsageError(
             "No commands were given; give heights in m, e.g. --commands 0.25,0.30."
         )
-    for height in commands:
-        if not low <= height <= high:
-            raise errors.UsageError(
-                f"A command of {height:g} m is out of reach of {robot.name}; give heights of the"
-                f" hip axis from {low:.2f} to {high:.2f} m."
-            )
+    check_heights(commands, command_limits(robot), robot.name)
     return tuple(sorted(set(commands)))
 
 
