@@ -101,8 +101,6 @@ def _kind_cells(name: str) -> tuple[str, ...]:
 
 
 class _Events:
-    """Tells faults and changes of mode, each on a line."""
-
     def __init__(self, robot: "EmulatedRobot") -> None:
         self._robot, self._faults_shown = robot, 0
         self._modes = [drive.machine.mode for drive in robot.drives]

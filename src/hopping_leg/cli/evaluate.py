@@ -154,7 +154,6 @@ def _judge(entries: "list[Entry]", setup: "RolloutConfig", args: Evaluate) -> "E
 
 
 def _robustness(args: Evaluate, entries: "list[Entry]", setup: "RolloutConfig") -> None:
-    """Run the suite, print the scores, write numbers and figure."""
     from hopping_leg.evaluate import figures, tables, trials
     from hopping_leg.evaluate.robustness import Suite, run_suite
     from hopping_leg.evaluate.robustness_axes import axes_named

@@ -135,7 +135,6 @@ def run(
 
 
 def _write(args: MovingBase | MultisineCommand) -> None:
-    """Write an excitation, show what it asks of the leg."""
     robot = load_robot(args.robot)
     template: Template
     if isinstance(args, MultisineCommand):
@@ -170,7 +169,6 @@ def _write(args: MovingBase | MultisineCommand) -> None:
 
 
 def _play(args: Play) -> None:
-    """Play every excitation and write its recording."""
     from hopping_leg.controllers.joint_pd import JointGains
 
     if not args.excitations:

@@ -156,7 +156,6 @@ def _identify(recordings: "list[Recording]", believed: str, folder: Path, *, qui
 
 
 def _train(source: str, folder: Path, args: Reproduce) -> Path:
-    """Train `fast` on a robot; return the policy."""
     from hopping_leg.rl.recipes.fast import FAST
     from hopping_leg.rl.train import train
 

@@ -124,7 +124,6 @@ def _draw(args: Draw) -> None:
 
 
 def _import(args: Import) -> None:
-    """Write the robot file, say what was assumed in it."""
     out = args.out or Path(f"{args.description.stem}.toml")
     if out.exists():
         raise UsageError(f"{out} exists and is not replaced; remove it, or give another --out.")

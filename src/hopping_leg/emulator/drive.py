@@ -57,12 +57,12 @@ class EmulatedDrive:
         self.console = Console(settings)
         self.machine = mode_machine.ModeMachine()
         self.law = torque_law.TorqueLaw(settings)
-        self.command = torque_law.Command()
+        self.command = dict(torque_law.NEW_COMMAND)
         self.disturbances = Disturbances()
         self.uptime = 0.0
         self.sensed: dict[int, float] = {}  # What its auxiliary ports read, by register
         self._brake, self.nominal_voltage = brake * 2 * math.pi, voltage
-        self._commanded = False
+        self._asked: DriveMode | None = None  # by a frame that is not yet read to its end
         self._velocity = self._torque = 0.0
 
     @property
@@ -89,26 +89,26 @@ class EmulatedDrive:
         """Power up with the output at a true position, revolutions."""
         self.settings.load()
         self.encoder.boot(output)
-        self.machine, self.command = mode_machine.ModeMachine(), torque_law.Command()
+        self.machine, self.command = mode_machine.ModeMachine(), dict(torque_law.NEW_COMMAND)
         self.uptime = 0.0
 
     def write(self, register: int, resolution: int, value: float) -> None:
         """Take one register from the host; one that cannot be written stays as it is."""
         scaled = value if resolution == F32 else scale_register(register, resolution, value)
         if register == Register.MODE and int(scaled) in mode_machine.MODES:
-            self.command = torque_law.Command(DriveMode(int(scaled)))
-            self._commanded = True
-        elif register in torque_law.COMMAND_FIELDS:
-            setattr(self.command, torque_law.COMMAND_FIELDS[register], float(scaled))
+            self.command, self._asked = dict(torque_law.NEW_COMMAND), DriveMode(int(scaled))
+        elif register in self.command:
+            self.command[register] = float(scaled)
         elif register == Register.SET_OUTPUT_NEAREST:
             self.encoder.set_nearest(float(scaled))
 
     def commit(self, time: float) -> None:
         """Act on a frame's mode write, once all its registers are written."""
-        if self._commanded:
-            self._commanded = False
-            timeout = self.command.timeout or self.settings["servo.default_timeout_s"]
-            self.machine.command(self.command.mode, time, timeout / self.disturbances.clock)
+        if self._asked is not None:
+            timeout = self.command[Register.COMMAND_TIMEOUT]
+            timeout = timeout or self.settings["servo.default_timeout_s"]
+            self.machine.command(self._asked, time, timeout / self.disturbances.clock)
+            self._asked = None
 
     def update_sensors(self, output: float, velocity: float, torque: float) -> None:
         """Set what the sensors see of the output after a step of physics: rev, rev/s, N m."""
@@ -140,7 +140,7 @@ class EmulatedDrive:
         if mode == DriveMode.POSITION:
             torque = self.law.position(self.command, position, self._velocity)
         elif mode == DriveMode.ZERO_VELOCITY:
-            torque = self.law.zero_velocity(self.command.kd_scale, self._velocity)
+            torque = self.law.zero_velocity(self.command[Register.COMMAND_KD_SCALE], self._velocity)
         else:
             return -self._brake * self._velocity if mode == DriveMode.BRAKE else 0.0
         return self.law.limited(torque, position)

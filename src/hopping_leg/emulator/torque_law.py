@@ -5,42 +5,24 @@ position that is NaN is left alone; the firmware holds the one in which the mode
 """
 
 import math
-from dataclasses import dataclass
 
 from moteus.protocol import Register
 
-from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.emulator.mode_machine import Notice
 from hopping_leg.emulator.settings import Settings
 
-COMMAND_FIELDS: dict[int, str] = {
-    Register.COMMAND_POSITION: "position",
-    Register.COMMAND_VELOCITY: "velocity",
-    Register.COMMAND_FEEDFORWARD_TORQUE: "feedforward",
-    Register.COMMAND_KP_SCALE: "kp_scale",
-    Register.COMMAND_KD_SCALE: "kd_scale",
-    Register.COMMAND_POSITION_MAX_TORQUE: "max_torque",
-    Register.COMMAND_TIMEOUT: "timeout",
-    Register.COMMAND_ILIMIT_SCALE: "ilimit_scale",
+NEW_COMMAND: dict[int, float] = {
+    Register.COMMAND_POSITION: 0.0,
+    Register.COMMAND_VELOCITY: 0.0,
+    Register.COMMAND_FEEDFORWARD_TORQUE: 0.0,
+    Register.COMMAND_KP_SCALE: 1.0,
+    Register.COMMAND_KD_SCALE: 1.0,
+    Register.COMMAND_ILIMIT_SCALE: 1.0,
+    Register.COMMAND_POSITION_MAX_TORQUE: 100.0,
+    Register.COMMAND_TIMEOUT: 0.0,
 }
-"""Register to the field of ``Command`` that it holds."""
-
-
-@dataclass(slots=True)
-class Command:
-    """One command; a mode write starts from these defaults. Units are the drive's: rev, s, N m."""
-
-    mode: DriveMode = DriveMode.STOPPED
-    position: float = 0.0
-    velocity: float = 0.0
-    feedforward: float = 0.0
-    kp_scale: float = 1.0
-    kd_scale: float = 1.0
-    ilimit_scale: float = 1.0
-    max_torque: float = 100.0
-    timeout: float = 0.0
-    """0 takes the configured default, NaN never times out."""
-
+"""What a mode write makes of a command, in the units of the drive: rev, s, N m. A timeout
+of 0 takes the configured one, NaN never times out."""
 
 TORQUE_CONSTANT = 0.0275
 """Of the rotor, N m/A: 16 N m behind a gear of 6 take the 97 A that the board can give."""
@@ -55,15 +37,14 @@ class TorqueLaw:
     def __init__(self, settings: Settings) -> None:
         self._settings, self.notice = settings, 0
 
-    def position(self, command: Command, position: float, velocity: float) -> float:
+    def position(self, command: dict[int, float], position: float, velocity: float) -> float:
         """Return the torque of position mode, N m; see the firmware's ``ISR_DoPositionCommon``."""
-        settings = self._settings
-        target = position if math.isnan(command.position) else command.position
-        rate = 0.0 if math.isnan(command.velocity) else command.velocity
-        torque = command.feedforward
-        torque += settings["servo.pid_position.kd"] * command.kd_scale * (rate - velocity)
-        torque += settings["servo.pid_position.kp"] * command.kp_scale * (target - position)
-        return self._within(torque, command.max_torque, Notice.MAX_TORQUE)
+        target, rate, torque, kp, kd, _, most, _ = command.values()
+        target = position if math.isnan(target) else target
+        rate = 0.0 if math.isnan(rate) else rate
+        torque += self._settings["servo.pid_position.kd"] * kd * (rate - velocity)
+        torque += self._settings["servo.pid_position.kp"] * kp * (target - position)
+        return self._within(torque, most, Notice.MAX_TORQUE)
 
     def zero_velocity(self, kd_scale: float, velocity: float) -> float:
         """Return the torque of zero-velocity mode, N m."""

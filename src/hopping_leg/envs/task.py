@@ -118,7 +118,6 @@ class HoppingTask:
         self.reset()
 
     def _take(self, robot: Robot, noise: np.random.Generator) -> None:
-        """Set what depends on what the legs are."""
         options, count = self.options, self.count
         legs = self.task_legs or (TaskLeg(robot, robot, options.command_bounds),) * count
         self._ranges = np.array([leg.command_range for leg in legs])

@@ -177,7 +177,6 @@ def _compare(steps: Windows, seed: int) -> list[statistics.Neighbours]:
 
 
 def _staircase(label: str, steps: Windows) -> Staircase:
-    """Return how all runs up the staircase went together."""
     windows = [[window for _, window in found] for found in steps.values()]
     errors = [np.median(np.concatenate(metrics.errors_of(step))) for step in windows]
     medians = np.add(list(steps), errors)

@@ -164,7 +164,6 @@ class LiveSimulation:
 
 
 def _of_leg(seen: Measurement, leg: int) -> Measurement:
-    """Return what the controller of one leg sees."""
     part = slice(leg, leg + 1)
     return Measurement(seen.q[part], seen.qd[part], seen.command[part], seen.age[part])
 

@@ -147,7 +147,6 @@ class TrueStateMpc:
         return self._torque.copy()
 
     def _plan_for(self, robots: tuple[Robot, ...]) -> None:
-        """Plan on the parameters of robots."""
         self._known, how = robots, self.planning
         self._air = leg_table([_rigid(robot) for robot in robots], how.timestep)
         self._ground = self._air.copy()
