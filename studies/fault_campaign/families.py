@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -84,8 +84,8 @@ class Family:
     grounded: bool = False
 
 
-def _drive(rng: np.random.Generator) -> str:
-    return str(rng.choice(["hip", "knee", "both"]))
+def _drive(rng: np.random.Generator) -> Literal["hip", "knee", "both"]:
+    return rng.choice(["hip", "knee", "both"]).item()
 
 
 def _faulty(kind: str, values: Values = lambda _: {}) -> Draw:
@@ -203,7 +203,7 @@ _SEVERE: dict[str, Values] = {
 """Kinds of fault after which no run may go on."""
 
 
-def _severe(since: str, first: float, last: float) -> Draw:
+def _severe(since: Literal["powered", "flight"], first: float, last: float) -> Draw:
     """Return what draws a severe fault of a drive between two times after an event, s."""
 
     def draw(rng: np.random.Generator) -> Mishap:

@@ -153,8 +153,8 @@ def test_a_script_is_read(tmp_path):
     ("text", "sentence"),
     [
         ('[[fault]]\nkind = "late"', "There is no fault kind 'late'"),
-        ('[[fault]]\nkind = "unplug"\nat = -1', "must be 0 or more"),
-        ('[[fault]]\nkind = "unplug"\ncount = 0', "must be 1 or more"),
+        ('[[fault]]\nkind = "unplug"\nat = -1', "'at': Expected `float` >= 0.0"),
+        ('[[fault]]\nkind = "unplug"\ncount = 0', "'count': Expected `int` >= 1"),
         ('[[fault]]\nkind = "configuration"\nname = "servo.x"', "There is no drive setting"),
         ("x = 1", "must hold tables"),
     ],

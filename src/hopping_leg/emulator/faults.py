@@ -8,9 +8,10 @@ from collections import deque
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Protocol
 
 import numpy as np
+from msgspec import Meta
 
 from hopping_leg.emulator import reply_queue, settings
 from hopping_leg.errors import UsageError, unknown_name
@@ -23,10 +24,6 @@ if TYPE_CHECKING:
 
 KINDS: "dict[str, type[FaultKind]]" = {}  # Every kind that a script may name
 
-_SINCE = ("start", "powered", "flight")
-"""From when on ``at`` counts: the emulator's start, both drives powered, first lift-off."""
-
-_DRIVES = (*JOINTS, "both")
 Registers = dict[int, float]  # What a drive says, by register
 _FLIPS = 1 << 16
 _NOISE = b"@#!%\x07~ moteus?"
@@ -37,30 +34,23 @@ class Fault:
     """One entry of a fault script; UsageError says which field has no meaning."""
 
     kind: str
-    since: str = "powered"
-    at: float = 0.0
+    since: Literal["start", "powered", "flight"] = "powered"
+    """From when on ``at`` counts: the emulator's start, both drives powered, first lift-off."""
+    at: Annotated[float, Meta(ge=0)] = 0.0
     """Seconds after ``since``."""
-    drive: str = "both"
+    drive: Literal["hip", "knee", "both"] = "both"
     value: float | None = None
     """In the unit of the kind; none takes the kind's default."""
-    duration: float | None = None
+    duration: Annotated[float, Meta(ge=0)] | None = None
     """Seconds; none takes the kind's default, which for replies is their number."""
-    count: int = 1
+    count: Annotated[int, Meta(ge=1)] = 1
     """Replies, where the kind is about replies and no duration is given."""
     name: str = ""
     """Setting that is wrong, for ``configuration``."""
 
     def __post_init__(self) -> None:
-        valid = {"kind": KINDS, "since": _SINCE, "drive": _DRIVES}
-        for name, choices in valid.items():
-            if getattr(self, name) not in choices:
-                raise UsageError(unknown_name(f"fault {name}", str(getattr(self, name)), choices))
-        for name in ("at", "duration"):
-            seconds = getattr(self, name)
-            if seconds is not None and not seconds >= 0:
-                raise UsageError(f"'{name}' of a {self.kind} is {seconds} s but must be 0 or more.")
-        if self.count < 1:
-            raise UsageError(f"'count' of a {self.kind} is {self.count} but must be 1 or more.")
+        if self.kind not in KINDS:
+            raise UsageError(unknown_name("fault kind", self.kind, KINDS))
         KINDS[self.kind].check(self)
 
     @property

@@ -1,8 +1,9 @@
 """What is on its way to the host, in the order in which it is due."""
 
-import heapq
-import itertools
+import bisect
+import math
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Generic, TypeVar
 
 from hopping_leg.deploy.frames import Frame
@@ -27,20 +28,18 @@ class TimedQueue(Generic[Item]):
     """Things in the order in which they are due; equal times keep their order."""
 
     def __init__(self) -> None:
-        self._heap: list[tuple[float, int, Item]] = []
-        self._numbers = itertools.count()
+        self._waiting: list[tuple[float, Item]] = []
 
     def put(self, due: float, item: Item) -> None:
         """Add something that is due at a time, s."""
-        heapq.heappush(self._heap, (due, next(self._numbers), item))
+        bisect.insort(self._waiting, (due, item), key=itemgetter(0))
 
     def take(self, time: float) -> list[Item]:
         """Remove and return what is due at a time, s."""
-        items = []
-        while self._heap and self._heap[0][0] <= time:
-            items.append(heapq.heappop(self._heap)[2])
-        return items
+        due = bisect.bisect(self._waiting, time, key=itemgetter(0))
+        items, self._waiting = self._waiting[:due], self._waiting[due:]
+        return [item for _, item in items]
 
-    def next_due(self) -> float | None:
-        """Return when the next thing is due, s; None if nothing waits."""
-        return self._heap[0][0] if self._heap else None
+    def next_due(self) -> float:
+        """Return when the next thing is due, s; infinite if nothing waits."""
+        return self._waiting[0][0] if self._waiting else math.inf

@@ -102,9 +102,7 @@ class Server:
     def turn(self) -> None:
         """Wait for the host or the clock, then do what is due."""
         waiting = [self.port] if self.port.plugged else []
-        due = self.robot.time + TIMESTEP
-        if (reply := self.robot.reply_queue.next_due()) is not None:
-            due = min(due, reply)
+        due = min(self.robot.time + TIMESTEP, self.robot.reply_queue.next_due())
         patience = max(due + self._offset - time.monotonic(), 0.0)
         ready, _, _ = select.select(waiting, [], [], patience)
         self._catch_up()

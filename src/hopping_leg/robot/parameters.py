@@ -5,6 +5,7 @@ import hashlib
 import itertools
 import json
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -16,9 +17,6 @@ from hopping_leg.robot.model_mismatch import ModelMismatch
 
 JOINTS = ("hip", "knee")
 """Actuated joints, in the order of every pair in this package."""
-
-KINDS = ("leg", "pendulum")
-"""What a robot may be."""
 
 DEFAULT_STOPS = {"hip": float(np.pi), "knee": 2.7}
 """Where the joints of a leg whose file states no mechanical stops end, rad to either side: what
@@ -201,7 +199,7 @@ class Robot:
     description: str = ""
     boom: Boom = field(default_factory=Boom)
     """What carries the leg, if it is no rail."""
-    kind: str = "leg"
+    kind: Literal["leg", "pendulum"] = "leg"
     """``leg``, whose knee bends to the negative side, or ``pendulum``, which swings freely."""
     reality: ModelMismatch = field(default_factory=ModelMismatch)
     """What the real leg does beyond this; simulated by ``hopping_leg.sim``, unknown to control."""

@@ -6,11 +6,11 @@ from operator import attrgetter
 
 import numpy as np
 
-from hopping_leg.errors import RobotError, unknown_name
+from hopping_leg.errors import RobotError
 from hopping_leg.io import Tree
 from hopping_leg.robot.hardware import torque_constant
 from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.robot.parameters import JOINTS, KINDS, Robot
+from hopping_leg.robot.parameters import JOINTS, Robot
 
 Bounds = tuple[str, float, float, str]
 """A number's path in a robot file, its least and largest value, and what says so."""
@@ -109,8 +109,6 @@ def _stands(robot: Robot) -> bool:
 def check_physics(robot: Robot, origin: str) -> None:
     """Refuse fields that contradict each other, by a RobotError that names them."""
     hip, knee = robot.hardware.servos
-    if robot.kind not in KINDS:
-        raise RobotError(f"{origin}: 'kind': {unknown_name('kind of robot', robot.kind, KINDS)}")
     for path, low, high, why in _bounds(robot):
         value = attrgetter(path)(robot)
         if value is not None and not low <= value <= high:

@@ -6,19 +6,9 @@ Paper, "Energy Shaping". Each push presses with k F_f; each hop corrects k by th
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.controllers.energy_shaping import equations
+from hopping_leg.controllers.energy_shaping import equations, virtual_leg
 from hopping_leg.controllers.energy_shaping.gains import Gain, ShapingGains
-from hopping_leg.controllers.energy_shaping.virtual_leg import (
-    BRAKE_LIMIT,
-    FLIGHT_LIMIT,
-    PUSH_LIMIT,
-    LegView,
-    Phase,
-    TouchdownDetector,
-    foot_force_torque,
-    retraction,
-    view_leg,
-)
+from hopping_leg.controllers.energy_shaping.virtual_leg import LegView, Phase
 from hopping_leg.controllers.sample_history import DatedObserver
 from hopping_leg.robot import JOINTS, Robot, kinematics
 from hopping_leg.sim import CONTROL_RATE, Measurement
@@ -53,7 +43,7 @@ class EnergyShaping:
         """Forget everything; the legs stand and push next."""
         self._observer = DatedObserver(self.period, self.gains.position_pull)
         self._observer.reset(count)
-        self._detector = TouchdownDetector(self.robot, count, debounced=self.debounced)
+        self._detector = virtual_leg.TouchdownDetector(self.robot, count, debounced=self.debounced)
         self._stiffness, self._damping = (
             np.stack([getattr(self.gains, f"{joint}_{kind}") for joint in JOINTS], axis=-1)
             for kind in ("stiffness", "damping")
@@ -72,7 +62,7 @@ class EnergyShaping:
     def act(self, measurement: Measurement) -> Array:
         """Return joint torques, N m, (n, 2)."""
         command = measurement.command[:, 0]
-        leg = view_leg(self.robot, *self._joints(measurement))
+        leg = virtual_leg.view_leg(self.robot, *self._joints(measurement))
         self._length_0 = np.where(np.isnan(self._length_0), leg.length, self._length_0)
         self._pushed = np.where(np.isnan(self._pushed), command, self._pushed)
         self._clock = self._clock + self.period
@@ -82,14 +72,15 @@ class EnergyShaping:
         self._end_touchdown(leg, command)
         self._end_push(leg, liftoff)
         target = kinematics.joint_angles(self.robot, np.stack([landing, 0 * landing], axis=-1))
-        clock = self._clock
-        posture, posture_rate = retraction(self._liftoff_q, target, clock, gains.retract_time)
+        posture, posture_rate = virtual_leg.retraction(
+            self._liftoff_q, target, self._clock, gains.retract_time
+        )
         flying = self._stiffness * (posture - leg.q) + self._damping * (posture_rate - leg.qd)
         self._end_flight(leg, posture_rate, flying, command)
         self._estimate_height(leg)
         push = self._force(leg, command, liftoff, landing)
         side = -gains.kp_y * leg.y - gains.kd_y * leg.y_rate
-        pressing = foot_force_torque(leg, push, side)
+        pressing = virtual_leg.foot_force_torque(leg, push, side)
         share = np.where(self._phase == Phase.FLIGHT, 0.0, 1.0)
         pushes = self._phase == Phase.LIFTOFF
         self._share = np.where(pushes, self._pushing_share(leg, liftoff), share)
@@ -127,7 +118,7 @@ class EnergyShaping:
 
     def _end_push(self, leg: LegView, liftoff: Array) -> None:
         done, rate, since = self._lifted_off(leg, liftoff)
-        who = (self._phase == Phase.LIFTOFF) & (done | (self._clock > PUSH_LIMIT))
+        who = (self._phase == Phase.LIFTOFF) & (done | (self._clock > virtual_leg.PUSH_LIMIT))
         self._liftoff_height = np.where(who, leg.stand, self._liftoff_height)
         self._liftoff_rate = np.where(who, rate, self._liftoff_rate)
         self._liftoff_q = np.where(who[:, None], leg.q, self._liftoff_q)
@@ -137,7 +128,7 @@ class EnergyShaping:
         gains, clock = self.gains, self._clock
         shortest = gains.flight_min + gains.flight_min_slope * (command - gains.reference)
         touched = self._touched(leg, posture_rate, flying, shortest)
-        who = (self._phase == Phase.FLIGHT) & (touched | (clock > FLIGHT_LIMIT))
+        who = (self._phase == Phase.FLIGHT) & (touched | (clock > virtual_leg.FLIGHT_LIMIT))
         if who.any():  # a touchdown that nobody noticed came before contact was believed
             too_short = np.minimum(clock, shortest)
             self._judge_hop(who, leg, command, np.where(touched, clock, too_short))
@@ -157,7 +148,7 @@ class EnergyShaping:
 
     def _end_touchdown(self, leg: LegView, command: Array) -> None:
         turned = (self._braked_rate(leg) >= 0) & (self._clock > 2 * self.period)
-        who = (self._phase == Phase.TOUCHDOWN) & (turned | (self._clock > BRAKE_LIMIT))
+        who = (self._phase == Phase.TOUCHDOWN) & (turned | (self._clock > virtual_leg.BRAKE_LIMIT))
         self._length_0 = np.where(who, leg.length, self._length_0)
         self._pushed = np.where(who, command, self._pushed)
         self._enter(who, Phase.LIFTOFF)
