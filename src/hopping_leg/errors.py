@@ -16,6 +16,9 @@ class HoppingLegError(Exception):
         return line if len(line) <= _LONGEST else f"{line[: _LONGEST // 2]}...{line[-200:]}"
 
 
+Error = type[HoppingLegError]  # What a caller wants to be raised
+
+
 class RobotError(HoppingLegError):
     """A robot file is missing, incomplete or physically impossible."""
 

@@ -15,7 +15,7 @@ from typing import Any, Literal, TypeVar, cast, get_args, get_origin, get_type_h
 
 import msgspec
 
-from hopping_leg.errors import HoppingLegError, TraceError, UsageError, unknown_name
+from hopping_leg.errors import Error, HoppingLegError, TraceError, UsageError, unknown_name
 
 Tree = dict[str, Any]  # Nested tables as read from TOML or JSON
 
@@ -56,24 +56,18 @@ def write_json(path: Path, value: object) -> None:
 _MOST_DIGITS = 300  # Of an integer; longer ones do not fit the numbers that they are computed with
 
 
-def parse_json(
-    content: bytes | str, origin: str, error: type[HoppingLegError] = UsageError
-) -> Tree:
+def parse_json(content: bytes | str, origin: str, error: Error = UsageError) -> Tree:
     """Return the object that JSON holds; ``error`` says that it is damaged or no object."""
     return _parse(json.loads, content, origin, "readable as JSON", error)
 
 
-def parse_toml(content: bytes, origin: str, error: type[HoppingLegError] = UsageError) -> Tree:
+def parse_toml(content: bytes, origin: str, error: Error = UsageError) -> Tree:
     """Return the tables that TOML holds; ``error`` says where it is damaged."""
     return _parse(lambda text: tomllib.loads(text.decode()), content, origin, "valid TOML", error)
 
 
 def _parse(
-    read: Callable[[Any], Any],
-    content: object,
-    origin: str,
-    form: str,
-    error: type[HoppingLegError],
+    read: Callable[[Any], Any], content: object, origin: str, form: str, error: Error
 ) -> Tree:
     try:
         tree = read(content)
@@ -141,7 +135,7 @@ def quantity(unit: str, default: float | None, **valid: bool) -> Any:  # noqa: A
 
 
 def read_dataclass(
-    kind: type[Kind], tree: object, origin: str, *, error: type[HoppingLegError] = UsageError
+    kind: type[Kind], tree: object, origin: str, *, error: Error = UsageError
 ) -> Kind:
     """Return the dataclass that a table, field names to values, describes, by ``msgspec.convert``.
 
@@ -162,13 +156,7 @@ def read_dataclass(
         raise type(problem)(f"{origin}: {problem}") from None
 
 
-def _check(
-    kind: Any,  # noqa: ANN401
-    value: object,
-    path: str,
-    origin: str,
-    error: type[HoppingLegError],
-) -> None:
+def _check(kind: Any, value: object, path: str, origin: str, error: Error) -> None:  # noqa: ANN401
     """Refuse unknown fields, values beyond the choices, and numbers that are not finite."""
     subject = f"{origin}: '{path}'"
     choices = get_args(kind) if get_origin(kind) is Literal else ()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from filelock import BaseFileLock, FileLock, Timeout
 
-from hopping_leg.errors import HoppingLegError
+from hopping_leg.errors import Error
 from hopping_leg.io import safe_file_name
 
 FOLDER_LOCK = ".lock"  # Name of the file that says who works in a folder
@@ -17,14 +17,14 @@ FOLDER_LOCK = ".lock"  # Name of the file that says who works in a folder
 _MASTERS = ("/dev/ptmx", "/dev/pts/ptmx")
 
 
-def named_lock(name: str, what: str, error: type[HoppingLegError]) -> BaseFileLock:
+def named_lock(name: str, what: str, error: Error) -> BaseFileLock:
     """Hold a name on this computer until ``release``; ``what`` is its name in messages."""
     file = f"hopping-leg-{safe_file_name(name)}.lock"
     return _held(Path(tempfile.gettempdir()) / file, what, error)
 
 
 @contextlib.contextmanager
-def hold_folder(folder: Path, error: type[HoppingLegError]) -> Iterator[None]:
+def hold_folder(folder: Path, error: Error) -> Iterator[None]:
     """Let no other process work in a folder meanwhile; where one does raise ``error``."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -34,7 +34,7 @@ def hold_folder(folder: Path, error: type[HoppingLegError]) -> Iterator[None]:
         yield
 
 
-def _held(file: Path, what: str, error: type[HoppingLegError]) -> BaseFileLock:
+def _held(file: Path, what: str, error: Error) -> BaseFileLock:
     lock = FileLock(file, blocking=False, thread_local=False)
     try:
         lock.acquire()
@@ -48,7 +48,7 @@ def _held(file: Path, what: str, error: type[HoppingLegError]) -> BaseFileLock:
 class DeviceLock:
     """Holds a device, which no other process may have open, until ``close``."""
 
-    def __init__(self, path: Path, error: type[HoppingLegError]) -> None:
+    def __init__(self, path: Path, error: Error) -> None:
         try:
             self._descriptor = os.open(path, os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError as problem:

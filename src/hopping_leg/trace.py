@@ -13,7 +13,7 @@ import numpy as np
 import polars as pl
 
 from hopping_leg.arrays import Array
-from hopping_leg.errors import HoppingLegError, TraceError
+from hopping_leg.errors import Error, TraceError
 from hopping_leg.io import parse_json, write_atomically
 
 SCHEMA = 1
@@ -45,9 +45,7 @@ def interpolated(name: str) -> pl.Expr:
     return pl.when(known.forward_fill(10).is_not_null()).then(known.interpolate())
 
 
-def read_parquet(
-    content: bytes, origin: str, error: type[HoppingLegError]
-) -> tuple[pl.DataFrame, dict[str, str]]:
+def read_parquet(content: bytes, origin: str, error: Error) -> tuple[pl.DataFrame, dict[str, str]]:
     """Return a Parquet file's table and metadata; ``error`` says what polars finds wrong."""
     try:
         metadata = pl.read_parquet_metadata(io.BytesIO(content))

@@ -127,7 +127,7 @@ def _bare_wake_ups(seconds: float) -> dict[str, float]:
     """Return how late the computer wakes a loop of the same rate and priority that does nothing."""
     say(f"{seconds:.0f} s of a loop that does nothing ...")
     clock, late = RealClock(), []
-    with keeping_time(realtime=True):
+    with keeping_time():
         due = clock.now()
         for _ in range(round(seconds * CONTROL_RATE)):
             due += 1 / CONTROL_RATE

@@ -27,7 +27,7 @@ def put_behind(monkeypatch, *, clamped=False, **start):
     quick = functools.partial(motion_sequence.SequenceTiming, rise=0.4, settle=0.1, sink=0.5)
     monkeypatch.setattr(motion_sequence, "SequenceTiming", quick)
     quiet = contextlib.nullcontext(())
-    monkeypatch.setattr(hardware_trials, "keeping_time", lambda **_: quiet)
+    monkeypatch.setattr(hardware_trials, "keeping_time", lambda: quiet)
     return lockstep
 
 

@@ -120,19 +120,14 @@ def _dispatch(words: list[str]) -> int:
     return 0
 
 
-def read_options(
-    options: Any,  # noqa: ANN401
-    program: str,
-    description: str | None,
-    words: Sequence[str],
-) -> Any:  # noqa: ANN401
+def read_options(options: Any, program: str, about: str | None, words: Sequence[str]) -> Any:  # noqa: ANN401
     """Return an instance of a dataclass of options, or of one of a union's, as subcommands.
 
     Lists may be given with commas or spaces. SystemExit ends the program after it has printed the
     help that was asked for, or what is wrong with the words.
     """
     apart = [part for word in words for part in _parts(word)]
-    return tyro.cli(options, prog=program, description=description, args=apart, config=_CONFIG)
+    return tyro.cli(options, prog=program, description=about, args=apart, config=_CONFIG)
 
 
 def _parts(word: str) -> list[str]:

@@ -98,13 +98,7 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     entries, setup = load(args)
     if args.suite == "robustness":
         _robustness(args, entries, setup)
-    else:
-        _paper(args, entries, setup, notes)
-
-
-def _paper(
-    args: Evaluate, entries: "list[Entry]", setup: "RolloutConfig", notes: Sequence[str]
-) -> None:
+        return
     from hopping_leg.evaluate import prediction, tables, trials
 
     judged = _judge(entries, setup, args)

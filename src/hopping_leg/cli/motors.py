@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from hopping_leg.cli.options import say, show_table
-from hopping_leg.deploy import preflight, safety_limits
+from hopping_leg.deploy import preflight
+from hopping_leg.deploy.safety_limits import SafetyLimits
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import JOINTS, Robot
 
@@ -22,18 +23,14 @@ def connect(robot: Robot, transport: str) -> "contextlib.closing[MoteusLink]":
     return contextlib.closing(MoteusLink(robot, open_transport(transport)))
 
 
-def find(
-    link: "MoteusLink", robot: Robot, limits: safety_limits.SafetyLimits
-) -> list[preflight.Finding]:
+def find(link: "MoteusLink", robot: Robot, limits: SafetyLimits) -> list[preflight.Finding]:
     """Return all checks of both drives, and of what measures the height."""
     from hopping_leg.deploy.drive_info import check_height, inspect
 
     return [*preflight.check_drives(robot, limits, inspect(link)), *check_height(link)]
 
 
-def check(
-    link: "MoteusLink", robot: Robot, limits: safety_limits.SafetyLimits
-) -> dict[str, dict[str, str]]:
+def check(link: "MoteusLink", robot: Robot, limits: SafetyLimits) -> dict[str, dict[str, str]]:
     """Refuse unfit drives with a HardwareError; return what was found, for the trace."""
     findings = find(link, robot, limits)
     preflight.require_fit(findings)

@@ -127,14 +127,10 @@ def run(
     | Annotated[MultisineCommand, tyro.conf.subcommand(name="multisine")]
     | Play,
 ) -> None:
-    """Write an excitation, or play some and record."""
+    """Write an excitation and show what it asks of the leg, or play some and record."""
     if isinstance(args, Play):
         _play(args)
-    else:
-        _write(args)
-
-
-def _write(args: MovingBase | MultisineCommand) -> None:
+        return
     robot = load_robot(args.robot)
     template: Template
     if isinstance(args, MultisineCommand):

@@ -38,8 +38,7 @@ _RUNS = 5
 def open_session(content: bytes, origin: str) -> Any:  # noqa: ANN401
     """Return a session on one thread; raise ``PolicyError`` where the content is no ONNX graph."""
     options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1
-    options.inter_op_num_threads = 1
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.log_severity_level = 4
     try:

@@ -8,7 +8,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from hopping_leg.deploy import drive_link, safety_limits, stop_reasons
+from hopping_leg.deploy import drive_link, stop_reasons
+from hopping_leg.deploy.safety_limits import SafetyLimits
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot import JOINTS, REGISTER_MAP, Robot
 
@@ -90,9 +91,7 @@ class Finding:
     setting: str = ""
 
 
-def check_drives(
-    robot: Robot, limits: safety_limits.SafetyLimits, drives: Sequence[DriveInfo]
-) -> list[Finding]:
+def check_drives(robot: Robot, limits: SafetyLimits, drives: Sequence[DriveInfo]) -> list[Finding]:
     """Return all checks of both drives, hip and knee; ``limits`` say where the leg may start."""
     return [f for joint, facts in enumerate(drives) for f in _check(robot, limits, joint, facts)]
 
@@ -105,9 +104,7 @@ def require_fit(findings: Sequence[Finding]) -> None:
         raise HardwareError(f"Not armed: {complaints[0]}{more}")
 
 
-def _check(
-    robot: Robot, limits: safety_limits.SafetyLimits, joint: int, facts: DriveInfo
-) -> list[Finding]:
+def _check(robot: Robot, limits: SafetyLimits, joint: int, facts: DriveInfo) -> list[Finding]:
     name, address = JOINTS[joint], drive_link.joint_transforms(robot)[joint].id
 
     def finding(check: str, found: str, good: bool, complaint: str, setting: str = "") -> Finding:

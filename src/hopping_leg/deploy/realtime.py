@@ -126,14 +126,8 @@ def uninterrupted() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def keeping_time(*, realtime: bool) -> Iterator[tuple[str, ...]]:
-    """Let a loop run undisturbed, with priority, memory and processors, unless time is virtual.
-
-    Yields notices of what the computer does not permit.
-    """
-    if not realtime:
-        yield ()
-        return
+def keeping_time() -> Iterator[tuple[str, ...]]:
+    """Let a loop run undisturbed; yield notices of what the computer does not permit."""
     notices = (lock_memory(), prefer_this_process())
     try:
         with processors_awake() as asleep, uninterrupted():

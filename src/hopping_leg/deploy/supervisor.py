@@ -12,7 +12,10 @@ latched.
 from dataclasses import dataclass
 from enum import IntEnum
 
-from hopping_leg.deploy import drive_link, safety_limits, stop_reasons
+from hopping_leg.deploy import stop_reasons
+from hopping_leg.deploy.drive_link import BRAKE, LIMP, STOP, Action, DriveCommand, DriveMode, Pair
+from hopping_leg.deploy.safety_limits import SafetyLimits
+from hopping_leg.deploy.stop_reasons import Cause, Operator, Reason, SupervisorInput
 
 
 class State(IntEnum):
@@ -25,7 +28,7 @@ class State(IntEnum):
     STOPPED = 4
 
 
-_NOTHING_YET = stop_reasons.Cause(stop_reasons.Reason.NONE)
+_NOTHING_YET = Cause(Reason.NONE)
 _NO_COUNTS = stop_reasons.Counts()
 
 
@@ -44,15 +47,15 @@ class SupervisorState:
 
     state: State = State.DISARMED
     since: float = 0.0
-    cause: stop_reasons.Cause = _NOTHING_YET
-    stop_cause: stop_reasons.Cause = _NOTHING_YET
+    cause: Cause = _NOTHING_YET
+    stop_cause: Cause = _NOTHING_YET
     counts: stop_reasons.Counts = _NO_COUNTS
-    told: drive_link.Pair = (0.0, 0.0)
+    told: Pair = (0.0, 0.0)
 
 
 def supervise(
-    limits: safety_limits.SafetyLimits, before: SupervisorState, seen: stop_reasons.SupervisorInput
-) -> tuple[SupervisorState, drive_link.DriveCommand]:
+    limits: SafetyLimits, before: SupervisorState, seen: SupervisorInput
+) -> tuple[SupervisorState, DriveCommand]:
     """Decide a tick: what to remember, and what leaves, always finite and within the limits."""
     counts = before.counts.after(limits, seen, before.told)
     state, cause = _next(limits, before, counts, seen)
@@ -66,70 +69,66 @@ def supervise(
 
 
 def _next(
-    limits: safety_limits.SafetyLimits,
+    limits: SafetyLimits,
     before: SupervisorState,
     counts: stop_reasons.Counts,
-    seen: stop_reasons.SupervisorInput,
-) -> tuple[State, stop_reasons.Cause]:
+    seen: SupervisorInput,
+) -> tuple[State, Cause]:
     """Return the state after a tick and the cause of the change, if it is one."""
     match before.state:
         case State.DISARMED | State.STOPPED:
-            if seen.operator is stop_reasons.Operator.ARM:
-                return State.ARMING, stop_reasons.Cause(stop_reasons.Reason.OPERATOR_ARMED)
-            if seen.operator is stop_reasons.Operator.STOP and before.state is State.DISARMED:
-                return State.STOPPED, stop_reasons.Cause(stop_reasons.Reason.OPERATOR_STOP)
+            if seen.operator is Operator.ARM:
+                return State.ARMING, Cause(Reason.OPERATOR_ARMED)
+            if seen.operator is Operator.STOP and before.state is State.DISARMED:
+                return State.STOPPED, Cause(Reason.OPERATOR_STOP)
         case State.DAMPING:
             return _calm_down(limits, before, seen)
         case State.ARMING | State.RUNNING:
             arming = before.state is State.ARMING
-            if seen.operator is stop_reasons.Operator.STOP:
-                return State.DAMPING, stop_reasons.Cause(stop_reasons.Reason.OPERATOR_STOP)
+            if seen.operator is Operator.STOP:
+                return State.DAMPING, Cause(Reason.OPERATOR_STOP)
             found = stop_reasons.find_cause(limits, before.counts, counts, seen, arming=arming)
             if found is not None:
                 return State.DAMPING, found
             if arming:
                 return _arm(limits, before, seen)
             if seen.finished:
-                return State.DAMPING, stop_reasons.Cause(stop_reasons.Reason.FINISHED)
+                return State.DAMPING, Cause(Reason.FINISHED)
     return before.state, before.cause
 
 
 def _arm(
-    limits: safety_limits.SafetyLimits, before: SupervisorState, seen: stop_reasons.SupervisorInput
-) -> tuple[State, stop_reasons.Cause]:
-    if all(
-        reply is not None and reply.mode == drive_link.DriveMode.POSITION for reply in seen.replies
-    ):
-        return State.RUNNING, stop_reasons.Cause(stop_reasons.Reason.DRIVES_READY)
+    limits: SafetyLimits, before: SupervisorState, seen: SupervisorInput
+) -> tuple[State, Cause]:
+    if all(reply is not None and reply.mode == DriveMode.POSITION for reply in seen.replies):
+        return State.RUNNING, Cause(Reason.DRIVES_READY)
     if not seen.time - before.since <= limits.arming_time:
-        return State.DAMPING, stop_reasons.Cause(stop_reasons.Reason.ARMING_TOOK_TOO_LONG)
+        return State.DAMPING, Cause(Reason.ARMING_TOOK_TOO_LONG)
     return State.ARMING, before.cause
 
 
 def _calm_down(
-    limits: safety_limits.SafetyLimits, before: SupervisorState, seen: stop_reasons.SupervisorInput
-) -> tuple[State, stop_reasons.Cause]:
+    limits: SafetyLimits, before: SupervisorState, seen: SupervisorInput
+) -> tuple[State, Cause]:
     elapsed = seen.time - before.since
     resting = all(
         reply is not None and abs(reply.velocity) <= limits.rest_speed for reply in seen.replies
     )
     if resting and elapsed >= limits.damping_least:
-        return State.STOPPED, stop_reasons.Cause(stop_reasons.Reason.CAME_TO_REST)
+        return State.STOPPED, Cause(Reason.CAME_TO_REST)
     if not elapsed <= limits.damping_most:
-        return State.STOPPED, stop_reasons.Cause(stop_reasons.Reason.DAMPED_LONG_ENOUGH)
+        return State.STOPPED, Cause(Reason.DAMPED_LONG_ENOUGH)
     return State.DAMPING, before.cause
 
 
-def _outgoing(
-    limits: safety_limits.SafetyLimits, state: State, seen: stop_reasons.SupervisorInput
-) -> drive_link.DriveCommand:
+def _outgoing(limits: SafetyLimits, state: State, seen: SupervisorInput) -> DriveCommand:
     match state:
         case State.ARMING:
-            return drive_link.LIMP
+            return LIMP
         case State.RUNNING if seen.wanted is not None:
             pairs = zip(seen.wanted, limits.torque, strict=True)
             hip, knee = (max(-most, min(most, value)) for value, most in pairs)
-            return drive_link.DriveCommand(drive_link.Action.TORQUE, (hip, knee))
+            return DriveCommand(Action.TORQUE, (hip, knee))
         case State.DAMPING:
-            return drive_link.BRAKE
-    return drive_link.STOP
+            return BRAKE
+    return STOP

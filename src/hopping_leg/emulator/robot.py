@@ -84,11 +84,6 @@ class EmulatedRobot:
         while self.time + leg.TIMESTEP <= until + 1e-9:
             self._step()
 
-    def stand_still(self, seconds: float) -> None:
-        """Let the drives' clocks go on without the leg, s."""
-        for drive in self.drives:
-            drive.uptime += seconds
-
     def receive(self, frame: Frame) -> None:
         """Take a frame from the host now; the drives' answers go to the reply_queue.
 

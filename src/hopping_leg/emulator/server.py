@@ -115,7 +115,8 @@ class Server:
         if (lost := behind - _FURTHEST) > 0:
             self._offset += lost
             self.lost += lost
-            self.robot.stand_still(lost)
+            for drive in self.robot.drives:  # whose clocks go on
+                drive.uptime += lost
             now -= lost
         self.robot.advance(now)
 

@@ -4,6 +4,7 @@ Defaults are those of firmware for the controller board r4 with what the qdd100 
 only values that the emulator obeys are here.
 """
 
+from hopping_leg.deploy.frames import LineBuffer
 from hopping_leg.errors import UsageError, unknown_name
 
 CHANNEL = 1  # Stream channel of the console
@@ -70,15 +71,13 @@ class Console:
     """A drive's console, tunnelled in frames: the host writes lines and polls for the answers."""
 
     def __init__(self, settings: Settings) -> None:
-        self._settings = settings
-        self._input = self._output = b""
+        self._settings, self._lines, self._output = settings, LineBuffer(), b""
 
     def write(self, data: bytes) -> None:
         """Take text from the host; complete lines are executed."""
-        *lines, self._input = (self._input + data).replace(b"\r", b"\n").split(b"\n")
-        for line in filter(None, map(bytes.split, lines)):
+        for line in self._lines.feed(data):
             try:
-                answer = self._answer([word.decode("latin1") for word in line])
+                answer = self._answer(line.decode("latin1").split())
             except UsageError as error:
                 answer = f"ERR {error}"
             self._output += f"{answer}\r\n".encode()

@@ -130,9 +130,7 @@ def _serve(port: int) -> viser.ViserServer:
 
 
 def answer(
-    serve_page: Callable[[Any, Request], Response | None],
-    connection: Any,  # noqa: ANN401
-    request: Request,
+    serve_page: Callable[[Any, Request], Response | None], connection: object, request: Request
 ) -> Response | None:
     """Return the answer to a request, None where the websocket may be opened."""
     if _is_own(request):
