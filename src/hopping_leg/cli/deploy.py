@@ -27,8 +27,7 @@ from hopping_leg.errors import HardwareError, PolicyError, TraceError, UsageErro
 from hopping_leg.robot import CONTROL_RATE, Robot, SoftLimits, load_robot
 
 if TYPE_CHECKING:
-    from hopping_leg.controllers import command_schedule, protocol
-    from hopping_leg.deploy import hardware_trials, keyboard
+    from hopping_leg.deploy import hardware_trials, motion_sequence
 
 _SECONDS = 10.0
 _MOST_SHARE = 0.5  # Of a control period that a policy may take
@@ -67,7 +66,7 @@ def run(args: Deploy) -> None:
 
     robot = load_robot(args.robot or robot_of([args.controller]))
     robot.require_leg()
-    done = _perform(args, robot, *_plan(args, robot))
+    done = _perform(args, robot, _sequence(args, robot))
     cause = done.outcome.supervisor.stop_cause
     events = done.trace.header["events"]
     options.say(
@@ -89,12 +88,12 @@ def run(args: Deploy) -> None:
         raise TraceError(done.complaint)
 
 
-def _plan(
-    args: Deploy, robot: Robot
-) -> "tuple[protocol.Controller, command_schedule.CommandSchedule | keyboard.LiveHeight, float]":
-    """Return controller, heights and seconds; whatever is wrong with them is found here."""
+def _sequence(args: Deploy, robot: Robot) -> "motion_sequence.MotionSequence":
+    """Return what the leg shall do; whatever is wrong with it is found here."""
     from hopping_leg.controllers import command_schedule, policy, registry
-    from hopping_leg.deploy import keyboard
+    from hopping_leg.controllers.fallback import with_fallback
+    from hopping_leg.deploy import keyboard, motion_sequence
+    from hopping_leg.sim import SoftLimiter
 
     if args.schedule is not None and args.command is not None:
         raise UsageError("--command and --schedule exclude each other; give one of them.")
@@ -117,36 +116,28 @@ def _plan(
     seconds = args.seconds or (_SECONDS if args.schedule is None else schedule.seconds)
     if not 0 < seconds <= 3600:
         raise UsageError(f"--seconds is {seconds:g} but must lie between 0 and 3600.")
-    heights = keyboard.LiveHeight(schedule.at(0.0), valid) if args.live else schedule
-    return controller, heights, seconds
-
-
-def _perform(
-    args: Deploy,
-    robot: Robot,
-    controller: "protocol.Controller",
-    heights: "command_schedule.CommandSchedule | keyboard.LiveHeight",
-    seconds: float,
-) -> "hardware_trials.Performance":
-    from hopping_leg.controllers.fallback import with_fallback
-    from hopping_leg.deploy import hardware_trials, keyboard, motion_sequence
-    from hopping_leg.sim import SoftLimiter
-
-    sequence = motion_sequence.MotionSequence(
+    return motion_sequence.MotionSequence(
         with_fallback(controller, robot),
-        heights,
+        keyboard.LiveHeight(schedule.at(0.0), valid) if args.live else schedule,
         motion_sequence.hopping_poses(robot),
         SoftLimiter(robot, SoftLimits()) if args.soft_limits else None,
         motion_sequence.SequenceTiming(hop=seconds),
         checked=robot,
     )
-    limits = safety_limits.hopping_limits(robot, CONTROL_RATE)
-    height = heights if isinstance(heights, keyboard.LiveHeight) else None
+
+
+def _perform(
+    args: Deploy, robot: Robot, sequence: "motion_sequence.MotionSequence"
+) -> "hardware_trials.Performance":
+    from hopping_leg.deploy import hardware_trials, keyboard
+
+    limits, name = safety_limits.hopping_limits(robot, CONTROL_RATE), sequence.controller.name
+    height = sequence.commands if isinstance(sequence.commands, keyboard.LiveHeight) else None
     with motors.connect(robot, args.transport) as link:
-        drives, name = motors.check(link, robot, limits), controller.name
+        drives = motors.check(link, robot, limits)
         motors.ask(
-            f"All checks passed. {robot.name} will move and hop for {seconds:g} s with {name};"
-            " keep a hand on the switch.",
+            f"All checks passed. {robot.name} will move and hop for {sequence.timing.hop:g} s with"
+            f" {name}; keep a hand on the switch.",
             yes=args.yes,
         )
         return hardware_trials.perform(
