@@ -29,10 +29,7 @@ USUAL_PERIOD = 0.5
 
 @dataclass(frozen=True)
 class HopMeasurement:
-    """What is measured of the hops in a stretch of a run.
-
-    Heights of the apexes, (hops,), are in m; skipped hops should have happened and did not.
-    """
+    """What a stretch of a run tells: its hops' apexes, m, (hops,), and hops that were skipped."""
 
     apex: Array
     ticks: int
@@ -89,10 +86,7 @@ def measure_hops(
 
 
 def find_bounces(height: Array, clearance: Array) -> IntArray:
-    """Find maxima of the base height with the foot on the ground: hops that never took off.
-
-    Each, (bounces,), stands at least ``BOUNCE`` out of its surroundings.
-    """
+    """Find maxima, ``BOUNCE`` high, of the base height on the ground: hops that never took off."""
     from scipy.signal import find_peaks  # takes a second, which no other part of the package needs
 
     peaks, _ = find_peaks(height, prominence=BOUNCE)

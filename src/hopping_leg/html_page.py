@@ -14,10 +14,7 @@ from hopping_leg.figures import encode
 
 
 def page_template(package: str, name: str) -> Template:
-    """Return a template that lies in a package, beside those it includes.
-
-    It finds the common look as ``style``.
-    """
+    """Return a template of a package, which finds others beside it and the look as ``style``."""
     environment = Environment(
         loader=PackageLoader(package, ""),
         autoescape=True,

@@ -23,10 +23,7 @@ Kind = TypeVar("Kind")
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file so that a killed process or a full disk leaves the old one whole.
-
-    TraceError says that the file cannot be written.
-    """
+    """Write a file whole or, with a TraceError, not at all, also where the process is killed."""
     path = path.resolve()
     part = path.with_name(path.name + ".part")
     try:
@@ -114,10 +111,7 @@ def versions(*packages: str) -> dict[str, str]:
 
 
 def replace_at(tree: Kind, path: str, value: object) -> Kind:
-    """Return nested dataclasses or dictionaries with the entry at a dotted path replaced.
-
-    Dictionaries on the way are made where there are none.
-    """
+    """Return nested dataclasses or dictionaries, made where missing, with an entry replaced."""
     name, _, rest = path.partition(".")
     if isinstance(tree, dict):
         inner = replace_at(tree.get(name, {}), rest, value) if rest else value

@@ -50,10 +50,7 @@ def open_session(content: bytes, origin: str) -> Any:  # noqa: ANN401
 
 
 def measure_session(session: Any, shapes: dict[str, tuple[int, ...]], origin: str) -> float:  # noqa: ANN401
-    """Return how long a graph takes for one leg, s, the fastest of some runs.
-
-    PolicyError says that it fails, gives something else than torques, or does not return.
-    """
+    """Return how long a graph takes for a leg, s; PolicyError where it gives no torques."""
     feeds = {name: np.zeros((1, *shape), np.float32) for name, shape in shapes.items()}
     options, took = onnxruntime.RunOptions(), []
     options.log_severity_level = 4

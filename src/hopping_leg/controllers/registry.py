@@ -41,11 +41,7 @@ def controller_names() -> list[str]:
 
 
 def load_policy(name_or_path: str | Path) -> Policy:
-    """Load a shipped policy by name or a policy file.
-
-    PolicyError says that the file is missing, truncated or foreign, UsageError that no policy is
-    called so.
-    """
+    """Load a shipped policy or a file; PolicyError for a bad file, UsageError for no such name."""
     name = str(name_or_path)
     if name in shipped_policies():
         return Policy((_SHIPPED / f"{name}.onnx").read_bytes(), f"shipped policy '{name}'", name)

@@ -51,10 +51,7 @@ class SingleLeg:
 
 
 class UserController:
-    """Guards a controller named ``origin``; implements ``Controller``.
-
-    ``digest`` tells it from others of its name.
-    """
+    """Guards a controller, ``origin``, told from others by a digest; a ``Controller``."""
 
     def __init__(self, controller: Any, origin: str, name: object, digest: str) -> None:  # noqa: ANN401
         self.controller, self.origin, self.digest, self._count = controller, origin, digest, 0
@@ -96,11 +93,7 @@ def is_user_controller(name: str) -> bool:
 
 
 def load_user_controller(name: str, robot: Robot, rate: float) -> UserController:
-    """Make a controller from ``path/to/file.py:Class`` or ``module:Class``; rate is in Hz.
-
-    ControllerError says that there is no such file, module or class, that it fails, or that it is
-    no controller.
-    """
+    """Make a controller from ``FILE.py:CLASS`` or ``module:CLASS``, or raise ControllerError."""
     module, kind = _find(name)
     with guarded(name, f"could not be made as {name.rpartition(':')[2]}(robot, rate={rate:g})"):
         controller = kind(robot, rate=rate)

@@ -37,10 +37,7 @@ def inspect(link: MoteusLink) -> tuple[DriveInfo, DriveInfo]:
 
 
 def configure(link: MoteusLink, joint: int, settings: Sequence[Setting]) -> None:
-    """Write settings into a stopped drive (0 hip, 1 knee), and into its permanent memory.
-
-    HardwareError says that the drive does not take one.
-    """
+    """Write settings into a stopped drive (0 hip, 1 knee) for good, or raise HardwareError."""
     console = Console(link, joint)
     for command in (*(f"conf set {s.name} {s.text}" for s in settings), "conf write"):
         answer = console.ask(command, _WRITE_SECONDS)

@@ -114,10 +114,7 @@ class Fdcanusb(LineTransport):
 
 
 class SerialSensor:
-    """A sensor's serial line, on which every line begins with a number; never waits.
-
-    HardwareError says that the port is missing, in use or cannot be opened.
-    """
+    """A serial line whose lines begin with a number; HardwareError where it cannot be opened."""
 
     def __init__(self, path: str, baud: float) -> None:
         self._lock = locks.DeviceLock(Path(path), HardwareError)

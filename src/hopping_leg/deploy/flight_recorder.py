@@ -92,10 +92,7 @@ class FlightRecorder:
             pass
 
     def _write(self) -> bool:
-        """Write what comes next, and all that waits; return whether there is more to come.
-
-        What the disk refuses waits, in its order.
-        """
+        """Write what comes next behind all that waits; return whether there is more to come."""
         taken = self._queue.get()
         while taken is not None:
             if self._size + len(taken) > _WAITING:

@@ -44,10 +44,7 @@ _DRIVE_COLUMNS = (
 
 
 def columns(controller: Controller) -> tuple[str, ...]:
-    """Return the columns of a run's recording; the controller's own come last.
-
-    ControllerError says that it names one of the loop's for its own.
-    """
+    """Return a recording's columns; ControllerError says that a controller names one of ours."""
     drives = tuple(f"{joint}_{name}" for name in _DRIVE_COLUMNS for joint in JOINTS)
     names, own = (*_LOOP, *_HEIGHTS, *_TIMES, *drives), _internal_names(controller)
     if taken := sorted({*names} & {*own}):
@@ -84,10 +81,7 @@ class SampleBuffer:
             self._commands.pop(old, None)
 
     def measurement(self, tick: int, command: float) -> Measurement | None:
-        """Return what a controller sees at a tick, given the height commanded now, m.
-
-        None as long as no tick has samples of both joints.
-        """
+        """Return what a controller sees at a tick; None before any has samples of both joints."""
         newest = sorted((t for t in self._ticks if t <= tick and all(self._ticks[t])), reverse=True)
         if not newest:
             return None
@@ -114,10 +108,7 @@ class LoopOutcome:
 
 
 class ControlLoop:
-    """Runs one sequence on one link, from arming to the end of stopping.
-
-    The clock is the link's; everything is recorded.
-    """
+    """Runs one sequence on one link, from arming to the end of stopping, and records everything."""
 
     def __init__(
         self,
@@ -234,10 +225,7 @@ class ControlLoop:
                 self._samples.put(tick - ago, joint, reply)
 
     def _step(self, tick: int, time: float, *, over: bool) -> tuple[SequenceStep, list[float]]:
-        """Ask the sequence and what the controller wants recorded; an error is a complaint.
-
-        Once the run is ``over`` nothing is asked any more.
-        """
+        """Ask for a step and what is to be recorded; an error is a complaint."""
         command = self._sequence.command(time)
         unknown = [math.nan] * len(self._internals)
         if over or self._complaint:

@@ -60,10 +60,7 @@ class MoteusLink:
         return self.transport.trouble
 
     def exchange(self, outgoing: drive_link.DriveCommand, until: float) -> drive_link.Exchange:
-        """Tell both drives what to do and ask for their state in the same frames.
-
-        Waits no longer than ``until``, s on the loop's clock.
-        """
+        """Tell both drives what to do and ask for their state, by ``until``, s on our clock."""
         asked, late = self.clock.now(), list[tuple[int, drive_link.Reply]]()
         fresh: list[drive_link.Reply | None] = [None, None]
         self.transport.send(self._frames(outgoing, query=True))

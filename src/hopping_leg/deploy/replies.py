@@ -40,10 +40,7 @@ class DriveClock:
         """What the drive's clock has gained, beyond what quartzes do, s."""
 
     def date(self, counter: int, arrived: float) -> float | None:
-        """Return when a reply was measured, None if it was seen before; s on the host's clock.
-
-        The drive's counter, ms, wraps after 49 days.
-        """
+        """Return when a reply was measured, s on the host's clock; None if it was seen before."""
         step = (counter - (self._counter or 0) + _HALF) % _WRAP - _HALF
         if self._counter is None or step < _RESTART:
             self._counter, self._time = counter, counter % _WRAP * 1e-3
@@ -65,10 +62,7 @@ class DriveClock:
 
 
 def read_registers(data: bytes) -> dict[int, Any]:
-    """Return the registers that a drive's answer tells.
-
-    Where it is damaged, the client library's parser raises exceptions of many types.
-    """
+    """Return the registers that an answer tells; a damaged one raises exceptions of many types."""
     values = {}
     for part in multiplex.parse_frame(data):
         if part.type is SubframeType.READ:  # of which the parser yields as many as it says

@@ -76,10 +76,7 @@ def find(robot: Robot, bend: float, share: Array, q: Array, torque: Array) -> Sq
 
 
 def upward_force(robot: Robot, q: Array, torque: Array) -> Array:
-    """Return how a leg that stands as its file says pushes upward, over its weight, (...).
-
-    Joint angles are in rad, torques in N m, (..., 2).
-    """
+    """Return how a leg that stands pushes upward over its weight, (...); rad, N m, (..., 2)."""
     weight = dynamics.gravity_force(robot, q)
     transposed = np.swapaxes(kinematics.jacobian(robot, q), -1, -2)
     force = np.linalg.solve(transposed, (weight[..., 1:] - torque)[..., None])[..., 0]

@@ -56,10 +56,7 @@ class ModeMachine:
             self.mode, self.fault = DriveMode.FAULT, int(fault)
 
     def advance(self, time: float, *, outside_limits: bool = False) -> None:
-        """Let time pass.
-
-        ``outside_limits`` tells that position mode may not begin where the drive stands.
-        """
+        """Let time pass; ``outside_limits`` tells that position mode may not begin here."""
         if self.wanted != self.mode:
             self._change(time, outside_limits)
         if self.mode is DriveMode.ENABLING and time >= self._started + _ENABLING_TIME:

@@ -21,10 +21,7 @@ class LineProtocol:
         self.checksums = False
 
     def feed(self, data: bytes) -> list[Frame | bytes]:
-        """Take bytes from the host; return, in order, frames for the bus and answers to send.
-
-        A frame's ``OK`` comes before the frame.
-        """
+        """Take bytes; return, in order, answers to the host and, behind their ``OK``, frames."""
         return [item for line in self._lines.feed(data) for item in self._take(line)]
 
     def line(self, text: bytes) -> bytes:

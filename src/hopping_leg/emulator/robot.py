@@ -85,11 +85,7 @@ class EmulatedRobot:
             self._step()
 
     def receive(self, frame: Frame) -> None:
-        """Take a frame from the host now; the drives' answers go to the reply_queue.
-
-        Where the robot's ``reality`` has a latency of commands, the frame acts later but is
-        answered at once.
-        """
+        """Take a frame now and queue the answers; a latency of commands lets it act later."""
         message = bus.Message.read(frame)
         late = self._latency.command + self._latency.jitter * float(self._rng.random())
         if late:
@@ -133,10 +129,7 @@ class EmulatedRobot:
 
 
 def _identity(seed: str) -> dict[int, int]:
-    """Return the registers that tell what a drive was made with; the serial number is the seed's.
-
-    They can be read as 32-bit integers only.
-    """
+    """Return the registers of what a drive was made with; its serial number follows from a text."""
     words = struct.unpack("<3I", hashlib.sha256(seed.encode()).digest()[:12])
     return {
         Register.MODEL_NUMBER: _MODEL,

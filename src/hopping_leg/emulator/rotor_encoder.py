@@ -13,10 +13,7 @@ _RATIO, _SIGN = "motor_position.rotor_to_output_ratio", "motor_position.output.s
 
 
 class RotorEncoder:
-    """Position of one drive's output as its firmware knows it.
-
-    The gear ratio, turns of the rotor per turn of the output, is the truth, whatever is configured.
-    """
+    """Position of a drive's output as its firmware knows it; ``gear_ratio`` is the true one."""
 
     def __init__(self, settings: Settings, gear_ratio: float) -> None:
         self.gear_ratio, self._settings = gear_ratio, settings

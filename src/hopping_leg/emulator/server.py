@@ -49,10 +49,7 @@ class EmulatorConfig:
     """Also offer the terminal under this path, which stays the same when it is plugged again."""
 
     def build(self) -> EmulatedRobot:
-        """Return the emulated robot.
-
-        RobotError is for a robot that is unknown, wrong or cannot stand, UsageError for the pose.
-        """
+        """Return the emulated robot; RobotError refuses the robot, UsageError the pose."""
         robot = load_robot(self.robot)
         robot.require_leg()
         return EmulatedRobot(
@@ -122,10 +119,7 @@ class Server:
 
 
 def serve(robot: EmulatedRobot, port: LinePort, *, ready: bool) -> None:
-    """Hand over what is due between host and robot, and pull or push the plug.
-
-    ``ready`` tells that the host may have sent something.
-    """
+    """Hand over what is due, also from the host if it is ``ready``; pull or push the plug."""
     sensor = robot.robot.hardware.height
     if "/" in sensor.source:
         port.sensor = port.sensor or PtyPort(Path(sensor.source))

@@ -29,10 +29,7 @@ TORQUE_CONSTANT = 0.0275
 
 
 class TorqueLaw:
-    """The position controller of one drive and the limits behind it.
-
-    ``notice`` is the limit that was at work since it was last reset, 0 if none.
-    """
+    """Position control of one drive; ``notice`` is the limit that was at work since its reset."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings, self.notice = settings, 0
@@ -53,10 +50,7 @@ class TorqueLaw:
         return self._within(torque, settings["servo.timeout_max_torque_Nm"], Notice.MAX_TORQUE)
 
     def limited(self, torque: float, position: float) -> float:
-        """Return the torque that the limits leave, N m; NaN passes, as in the firmware.
-
-        The position, rev, is the output's as reported.
-        """
+        """Return the torque that the limits leave at a reported position, rev; NaN passes."""
         settings = self._settings
         low, high = settings["servopos.position_min"], settings["servopos.position_max"]
         beyond = max(position - high, 0.0) if torque > 0 else max(low - position, 0.0)

@@ -37,10 +37,7 @@ class PaperRewardConfig:
 
 
 def paper_reward(robot: Robot, config: PaperRewardConfig = PaperRewardConfig()) -> Reward:
-    """Return the paper's reward for a leg, whose joint limits and motors count.
-
-    x_o is the base's height where it stands at the start.
-    """
+    """Return the paper's reward for a leg; x_o is the base's height where it stands at first."""
     c, rest = config, np.array(standing_length(robot) + robot.foot.radius)
     fastest = np.square(robot.of_joints("no_load_speed")[None])
 

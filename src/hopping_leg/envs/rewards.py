@@ -57,10 +57,7 @@ def sum_of_joints(values: Array) -> Array:
 
 
 class LastingTerm:
-    """A term that remembers something from tick to tick, or changes while training proceeds.
-
-    A subclass overrides what it needs.
-    """
+    """A term that remembers something or changes in training; override what it needs."""
 
     def __call__(self, transition: Transition) -> Array | float:
         """Return the unweighted term, (n,), or one number for all."""
@@ -92,10 +89,7 @@ class RewardTerm(NamedTuple):
 
 
 class Reward:
-    """The weighted sum of a list of k terms, scaled for the critic's sake.
-
-    UsageError says that two terms have the same name.
-    """
+    """The scaled sum of k weighted terms; UsageError says that two have the same name."""
 
     def __init__(self, terms: Sequence[RewardTerm], scale: float = 1.0) -> None:
         self.terms, self.scale = tuple(terms), scale

@@ -355,10 +355,7 @@ class HoppingTask:
 
 @compiled
 def _clip(action: Array, full: Array, torque: Array) -> bool:
-    """Clip actions to [-1, 1] and set their torques; return whether all are finite.
-
-    ``full`` are the torques of a full action, (n, 2).
-    """
+    """Clip actions to [-1, 1], set torques by ``full`` ones, (n, 2); tell if all are finite."""
     for leg in range(len(action)):
         for joint in range(2):
             if not math.isfinite(action[leg, joint]):

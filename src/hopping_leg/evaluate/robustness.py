@@ -52,10 +52,7 @@ def run_suite(
     suite: Suite,
     on_progress: Callable[[str, float], None] = lambda _label, _share: None,
 ) -> dict[str, Any]:
-    """Let every controller meet every axis; return ``scores``, ``levels`` and more as JSON values.
-
-    UsageError says that a command is out of an entry's range, or a name is taken twice.
-    """
+    """Let every controller meet every axis; return ``scores``, ``levels`` and more, for JSON."""
     check_entries(entries, suite.commands)
     parts = (NOMINAL, *suite.axes)
     scores: list[dict[str, Any]] = []

@@ -174,10 +174,7 @@ JOINT = Axis("joint", "all axes at once, this share of the way to points of thei
 
 
 def axes_named(names: Sequence[str]) -> tuple[Axis, ...]:
-    """Return the axes of some names in their own order, ``JOINT`` last; without names, all.
-
-    UsageError says that there is no axis of a name.
-    """
+    """Return axes of these names, or all, in their own order; UsageError where there is none."""
     every = {axis.name: axis for axis in (*AXES, JOINT)}
     for name in names:
         if name not in every:

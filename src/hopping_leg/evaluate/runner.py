@@ -54,10 +54,7 @@ def load_entries(names: Sequence[str], robot: Robot, rate: float) -> list[Entry]
 
 
 def check_entries(entries: Sequence[Entry], commands: Sequence[float]) -> None:
-    """Check that there is something to judge, under names that differ, and what it is asked for.
-
-    UsageError says what is not so, e.g. a height, m, beyond the range of an entry's training.
-    """
+    """Refuse by a UsageError what has no name of its own or was not made for the commands, m."""
     labels = [entry.label for entry in entries]
     if not labels:
         raise UsageError("No controller was named; try `hop evaluate energy-shaping`.")

@@ -107,10 +107,7 @@ def evaluation_tables(evaluation: Row) -> dict[str, Markup]:
 
 
 def verdict(evaluation: Evaluation, controller: str) -> str:
-    """Return in a sentence how near it hops to its commands, what it skips and touches.
-
-    Heights between and beyond the commands count, too.
-    """
+    """Return in a sentence how near it hops to all its commands, what it skips and touches."""
     rows = [r for r in evaluation.summary + evaluation.ladder if r.controller == controller]
     errors = {row: abs(row.median_error_m) for row in rows if row.hops}
     if not errors:

@@ -45,10 +45,7 @@ def scaled(heights: Sequence[float], robot: Robot) -> tuple[float, ...]:
 
 
 def paper_trials(robot: Robot, commands: Sequence[float] | None = None) -> list[Trial]:
-    """Return all trials of an evaluation; ``commands``, m, are those of the fixed ones.
-
-    UsageError says that a command is out of the leg's reach.
-    """
+    """Return all trials; UsageError says that a command, m, of the fixed ones is out of reach."""
     chosen = choose_commands(robot, commands)
     trials = [Trial(((c, FIXED_SECONDS),), "fixed") for c in chosen]
     if len(chosen) > 1:
@@ -61,10 +58,7 @@ def paper_trials(robot: Robot, commands: Sequence[float] | None = None) -> list[
 def choose_commands(
     robot: Robot, commands: Sequence[float] | None, repeats: int = 1
 ) -> tuple[float, ...]:
-    """Return rising heights to hop to, m: those asked for, or the paper's scaled to the leg.
-
-    UsageError says that none can make this leg hop to one of them, or that none hops even once.
-    """
+    """Return rising heights, m, those asked for or the paper's scaled, or raise UsageError."""
     if repeats < 1:
         raise errors.UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
     if commands is None:

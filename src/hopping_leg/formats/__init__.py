@@ -65,10 +65,7 @@ Rows = dict[str, list[Tree]]
 
 
 def to_mcap(trace: Trace) -> bytes:
-    """Return a trace as an MCAP file; what is missing in a column is NaN.
-
-    TraceError says that the trace has no time, or one before 1970.
-    """
+    """Return a trace, gaps as NaN, as MCAP; TraceError where it has no time, or one before 1970."""
     from mcap_ros2.writer import Writer
     from rosbags.typesys import Stores, get_typestore
 

@@ -52,10 +52,7 @@ class ImportedRobot:
 
 
 def read_values(words: tuple[str, ...]) -> dict[str, float]:
-    """Return numbers given as ``path=value``; ``motor.X`` stands for both joints' ``motor.X``.
-
-    UsageError says that a path or value is none.
-    """
+    """Return numbers given as ``path=value``, ``motor.X`` for both joints, or raise UsageError."""
     valid, values = _units(), dict[str, float]()
     for word in words:
         path, _, text = word.partition("=")

@@ -59,10 +59,7 @@ def foot_position(robot: Geometry, q: Array) -> Array:
 
 
 def joint_angles(robot: Geometry, foot: Array) -> Array:
-    """Return the angles, rad, (..., 2), for a foot at (x_down, y), m, (..., 2), with q2 <= 0.
-
-    They are NaN where the foot is out of reach.
-    """
+    """Return angles, rad, (..., 2), q2 <= 0, for a foot at (x_down, y), m; NaN out of reach."""
     thigh, shank = robot.thigh.length, robot.shank.length
     square = np.sum(np.square(foot), axis=-1)
     cosine = (square - thigh**2 - shank**2) / (2 * thigh * shank)

@@ -74,10 +74,7 @@ def get_spec(
 
 
 def build_model(robot: Robot, timestep: float = TIMESTEP) -> mujoco.MjModel:
-    """Compile a robot's model; generalised coordinates are (rail height, hip, knee).
-
-    RobotError says that MuJoCo refuses the parameters, e.g. a mass that is too small.
-    """
+    """Compile a robot's model over (rail height, hip, knee), or raise RobotError."""
     try:
         return get_spec(robot, timestep).compile()
     except ValueError as error:

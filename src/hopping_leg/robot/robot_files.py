@@ -45,10 +45,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
 
 
 def robot_from_tree(tree: Tree, origin: str) -> Robot:
-    """Return the robot that tables describe, ``extends`` resolved.
-
-    RobotError names ``origin``, the field and what was valid.
-    """
+    """Return the robot of tables, ``extends`` resolved; RobotError names ``origin`` and field."""
     plain = _with_values(Robot, _complete(tree, origin), origin)
     robot = read_dataclass(Robot, plain, origin, error=RobotError)
     if not robot.name.strip():
@@ -58,10 +55,7 @@ def robot_from_tree(tree: Tree, origin: str) -> Robot:
 
 
 def parent_robot(name_or_path: str | Path) -> str | None:
-    """Return the name or path of the robot that a file extends, None if it stands alone.
-
-    RobotError says that the file is missing or not TOML.
-    """
+    """Return what robot a file extends, None if none; RobotError where it is missing, no TOML."""
     return _parent(_read(str(name_or_path)), str(name_or_path))[0] or None
 
 
@@ -74,10 +68,7 @@ def load_tree(name_or_path: str | Path) -> Tree:
 
 
 def doubts(name_or_path: str | Path) -> list[str]:
-    """Return sentences about a valid robot file's numbers that may not fit each other.
-
-    RobotError is raised as by ``load_robot``.
-    """
+    """Return sentences about numbers that may not fit each other; errors as of ``load_robot``."""
     origin = str(name_or_path)
     own = _read(origin)
     return find_doubts(robot_from_tree(own, origin), origin, own, *_parent(own, origin))

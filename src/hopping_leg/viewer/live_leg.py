@@ -123,10 +123,7 @@ class LiveSimulation:
         self._meet()
 
     def begin(self, names: tuple[str, ...], robot_name: str) -> None:
-        """Begin anew with controllers on a robot; another robot has its own settings.
-
-        Errors are those of the constructor; everything stays as it was.
-        """
+        """Begin anew, another robot with its own settings; on an error all stays as it was."""
         robot = load_robot(robot_name)
         robot.require_leg()
         if not 1 <= len(names) <= MOST:

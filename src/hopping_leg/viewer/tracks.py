@@ -208,11 +208,7 @@ class RecorderSource:
             self.notices.append(f"Waiting for a run in {path}.")
 
     def advance(self, seconds: float) -> None:
-        """Read what is new.
-
-        RobotError says that the run's robot is no shipped one and none was given, TraceError that
-        the file is no flight recording.
-        """
+        """Read what is new; RobotError for an unknown robot, TraceError for no flight recording."""
         self._wait -= seconds
         if self._wait <= 0:
             self._wait = _LOOK

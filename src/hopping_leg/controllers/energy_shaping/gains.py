@@ -143,10 +143,7 @@ class GainFile:
 
 
 def load_gains(name_or_path: str | Path = TUNED, robot: Robot | None = None) -> GainFile:
-    """Load a tuned set by shipped name, that of a robot if it has its own, or from a TOML file.
-
-    UsageError says that the file is missing or no gain file, and names the field.
-    """
+    """Load a shipped set, a robot's own if it has one, or a TOML file, or raise UsageError."""
     name = str(name_or_path)
     source: Any = Path(name) if name.endswith(".toml") else _SHIPPED / f"{name}.toml"
     own = _SHIPPED / f"{name}-{robot.name}.toml" if robot else source

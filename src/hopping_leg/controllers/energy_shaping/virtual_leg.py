@@ -91,10 +91,7 @@ class Phase(IntEnum):
 
 
 class TouchdownDetector:
-    """Watches how n legs deviate from the planned retraction.
-
-    ``debounced`` judges the median of three ticks: one noisy sample cannot fake a touchdown.
-    """
+    """Watches how n legs leave the planned retraction, debounced by a median of three."""
 
     def __init__(self, robot: Robot, count: int, *, debounced: bool) -> None:
         self._robot = robot
