@@ -126,7 +126,8 @@ def test_a_mode_write_resets_the_command(powered):
     powered.torque(0.5, 0.0)
     powered.cycle(powered.drives[0].make_position(position=math.nan, query=True))
     command = powered.robot.drives[0].command
-    assert (command.feedforward, command.kd_scale) == (0.0, 1.0)
+    assert command[R.COMMAND_FEEDFORWARD_TORQUE] == 0.0
+    assert command[R.COMMAND_KD_SCALE] == 1.0
 
 
 def test_power_up_finds_the_output_within_a_turn_of_the_rotor_only():
