@@ -21,8 +21,13 @@ def put_behind(monkeypatch, *, clamped=False, **start):
         legs = lockstep.robot.leg._legs
         legs.fixed_base = True
         legs.set_robots(legs.robots)
+
+    def link(robot, _transport):
+        lockstep.link.robot = robot  # as the host believes
+        return lockstep.link
+
     monkeypatch.setattr(transport, "open_transport", lambda name: None)
-    monkeypatch.setattr(moteus_link, "MoteusLink", lambda robot, transport: lockstep.link)
+    monkeypatch.setattr(moteus_link, "MoteusLink", link)
     monkeypatch.setattr(hardware_trials, "RealClock", lambda: lockstep)
     quick = functools.partial(motion_sequence.SequenceTiming, rise=0.4, settle=0.1, sink=0.5)
     monkeypatch.setattr(motion_sequence, "SequenceTiming", quick)
