@@ -24,7 +24,7 @@ REFUSED = [
     ("evaluate leg.urdf", "make a robot file of it: hop robots import leg.urdf."),
     ("evaluate energy-shaping --robot leg.urdf", "`hop robots import` makes one of a URDF"),
     ('evaluate "my leg\'s.toml"', "is a robot file, no controller; give it with --robot"),
-    ("evaluate spring --commands 0.5", "trained for 0.29 to 0.31 m"),
+    ("evaluate spring --commands 0.5", "give heights from 0.29 to 0.31 m"),
     ("evaluate spring --commands high", "--commands"),
     ("evaluate spring --seed -1", "--seed is -1"),
     ("evaluate spring --threads -1", "'threads' is -1"),

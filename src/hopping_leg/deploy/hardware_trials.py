@@ -84,7 +84,7 @@ def perform(
         TraceError: The flight recording cannot be created, or the trace cannot be written.
         HardwareError: The controller did not return, or a second signal ended the run.
     """
-    controller, rate, real = sequence.controller, 1 / limits.period, clock is None
+    controller, rate, real = sequence.controller, round(1 / limits.period, 6), clock is None
     recording = path.with_suffix(flight_recording.SUFFIX)
     header = {**_header(link.robot, controller, rate), **(facts or {})}
     recorder = flight_recorder.FlightRecorder(

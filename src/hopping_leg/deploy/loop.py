@@ -44,7 +44,7 @@ _DRIVE_COLUMNS = (
 
 
 def columns(controller: Controller) -> tuple[str, ...]:
-    """Return a recording's columns; ControllerError says that a controller names one of ours."""
+    """Return a recording's columns; ControllerError where a controller names one of the loop's."""
     drives = tuple(f"{joint}_{name}" for name in _DRIVE_COLUMNS for joint in JOINTS)
     names, own = (*_LOOP, *_HEIGHTS, *_TIMES, *drives), _internal_names(controller)
     if taken := sorted({*names} & {*own}):
