@@ -29,6 +29,7 @@ def test_a_training_tells_how_its_stages_ended(tmp_path, monkeypatch):
     assert not rows[2]["passed"], "after seconds of training"
     assert rows[3]["score_m"] == result["selected"]["worst_score_m"]
     card = (tmp_path / "model_card.md").read_text()
+    assert "\namong them the age of each joint sample, which the paper's 15 lack" in card
     for row in rows:
         judged = "passed" if row["passed"] else "**not passed**"
         told = (

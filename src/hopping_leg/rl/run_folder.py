@@ -5,6 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from hopping_leg.controllers.observation_history import OBSERVATION_HISTORIES, Dated
 from hopping_leg.controllers.registry import ROBOT_FILE
 from hopping_leg.errors import UsageError
 from hopping_leg.io import parse_json, versions, write_atomically, write_json
@@ -119,6 +120,8 @@ def model_card(result: dict[str, Any]) -> str:
     robot = f"`{name}`" if name in shipped_robots() else f"{name}, `{ROBOT_FILE}` in this folder"
     any_leg = result["options"]["legs"] == "any"
     legs = "any leg of this kind;\nthe trials below are on" if any_leg else "robot"
+    dated = issubclass(OBSERVATION_HISTORIES[task["observation"]], Dated)
+    age = ",\namong them the age of each joint sample, which the paper's 15 lack" if dated else ""
     steps, minutes, tried = selected["steps"], selected["minutes"], len(result["history"])
     chosen = (
         f"- Selection: the policy after {steps} steps ({minutes:.1f} min) of {tried} snapshots.\n"
@@ -127,7 +130,7 @@ def model_card(result: dict[str, Any]) -> str:
 
 One network from joint measurements to joint torques, for {legs} {robot}
 (parameters {result["robot_digest"]}), commands {commands[0]:g} to {commands[1]:g} m,
-{task["rate"]:g} Hz. Made by
+{task["rate"]:g} Hz, inputs `{task["observation"]}`{age}. Made by
 
     {result["command"]}
 
