@@ -13,7 +13,7 @@ from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot, shipped_robots
 from hopping_leg.sim import CONTROL_RATE
 
 ENERGY_SHAPING = "energy-shaping"
-"""The tuned baseline."""
+"""The baseline, tuned on the leg of its gain file."""
 
 _FLYING = "energy-shaping-flying"  # tuned to fly half of the time, as is asked of policies
 _LITERAL = "energy-shaping-literal"  # the paper's law and gains as printed
