@@ -98,11 +98,16 @@ def run_results(name: str) -> int:
 
 
 def store(file: Path, command: str) -> None:
-    """Rewrite a result as it is stored: with its command, without raw numbers, a line a record."""
+    """Rewrite a result as it is stored: with its command, without raw numbers, a line a record.
+
+    ``pairs`` are stored without the names of their entries, which ``columns`` has once.
+    """
     content = json.loads(file.read_text(encoding="utf-8"))
-    for raw in ("pairs", "trials"):
-        if isinstance(content.get(raw), list) and len(content[raw]) > 2 * LONGEST:
-            del content[raw]
+    if isinstance(content.get("trials"), list) and len(content["trials"]) > 2 * LONGEST:
+        del content["trials"]
+    if pairs := content.get("pairs"):
+        rows = [list(pair.values()) for pair in pairs]
+        content["pairs"] = {"columns": list(pairs[0]), "rows": rows}
     if len(content.get("summary", ())) > 2 * LONGEST:
         content = {key: entry for key, entry in content.items() if key not in NOT_SHOWN}
     content = condensed({**content, "command": command})

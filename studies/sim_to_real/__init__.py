@@ -13,22 +13,22 @@ Examples:
 """
 
 RESULTS = (
-    "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping --twins 100 "
-    "--seed 6000 --jobs 2 --out runs/zero-shot-twins "
-    "--json studies/sim_to_real/results/zero_shot_twins.json",
+    "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping "
+    "--twins 20 --seed 6000 --disturbance on off --jobs 2 "
+    "--out runs/zero-shot-twins --json studies/sim_to_real/results/zero_shot_twins.json",
     "python -m studies.time_to_accuracy --recipes universal --seeds 0 1 2 "
     "--out runs/time_to_accuracy && "
     "python -m studies.sim_to_real zero-shot --controllers universal "
     "runs/time_to_accuracy/universal-1/1/policy.onnx "
     "runs/time_to_accuracy/universal-2/1/policy.onnx energy-shaping --twins 20 --seed 7000 "
-    "--jobs 2 --out runs/zero-shot-seeds "
+    "--disturbance off --jobs 2 --out runs/zero-shot-seeds "
     "--json studies/sim_to_real/results/zero_shot_seeds.json",
     "hop robots draw legs --count 50 --seed 6000 --out runs/legs && "
     "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping "
     "--folder runs/legs --jobs 2 --out runs/zero-shot-legs "
     "--json studies/sim_to_real/results/zero_shot_legs.json",
     "python -m studies.sim_to_real transfer --methods universal-identified universal "
-    "energy-shaping energy-shaping-tuned --jobs 2 "
+    "energy-shaping energy-shaping-identified --jobs 2 "
     "--folder runs/transfer-universal --json studies/sim_to_real/results/universal.json",
     *(
         "python -m studies.sim_to_real transfer --methods identified-belt identified cad table-1 "

@@ -38,7 +38,7 @@ class Experiment:
     methods: tuple[str, ...] = DEFAULT
     """What policies are trained on, the others being compared with the first. Valid: identified,
     identified-belt, cad, table-1, truth, randomised, whose legs differ in training; and, not
-    trained, energy-shaping, energy-shaping-tuned, universal, universal-identified."""
+    trained, energy-shaping, energy-shaping-identified, universal, universal-identified."""
     seeds: tuple[int, ...] = (0,)
     """Seeds of the trainings, one of each method and twin each."""
     recipe: str = "fast"
@@ -63,9 +63,7 @@ class Experiment:
 class Chain:
     """Twins and methods of an experiment; each stage does what is not done yet.
 
-    Raises:
-        UsageError: An option has no meaning.
-        RobotError: There is no such twin.
+    UsageError says that an option has no meaning, RobotError that there is no such twin.
     """
 
     def __init__(self, asked: Experiment) -> None:

@@ -48,7 +48,7 @@ METHODS = {
         Method("truth", "true parameters: what a perfect fit would find", truth=True),
         Method(ENERGY_SHAPING, "energy shaping, shipped gains", untrained=ENERGY_SHAPING),
         Method(
-            "energy-shaping-tuned",
+            "energy-shaping-identified",
             "energy shaping, tuned on what both recordings identify",
             fitted=True,
             untrained=ENERGY_SHAPING,
@@ -70,11 +70,7 @@ DEFAULT = ("identified", "cad", "table-1", "randomised", ENERGY_SHAPING)
 
 
 def choose_methods(names: Sequence[str]) -> tuple[Method, ...]:
-    """Return methods by name, each once, energy shaping among them.
-
-    Raises:
-        UsageError: There is no such method, or none is named.
-    """
+    """Return methods by name, each once, energy shaping among them; UsageError without any."""
     for name in names:
         if name not in METHODS:
             raise UsageError(unknown_name("method", name, METHODS))

@@ -64,8 +64,7 @@ def _strokes(rig: Rig, seconds: float) -> Strokes:
 def fit(twin: Twin, recordings: Sequence[Path], file: Path, belt: bool) -> Row:
     """Identify a twin, with the knee's belt if asked, and write the robot file.
 
-    Returns:
-        Errors on data that the fit has not seen, before and after, and the parameters.
+    What is returned are errors on data that the fit has not seen, and the parameters.
     """
     believed = with_play(load_robot(twin.believed)) if belt else load_robot(twin.believed)
     links = {"thigh.inertia": believed.thigh.inertia, "shank.inertia": believed.shank.inertia}
@@ -101,11 +100,7 @@ def _truth(robot: Robot, name: str) -> float | None:
 
 
 def learn(recipe: Recipe, robot: Robot, seed: int, folder: Path) -> Row:
-    """Train a policy in the simulation of a robot; a training that was killed goes on.
-
-    Returns:
-        How it hops in the simulation that it was trained in.
-    """
+    """Train a policy in the simulation of a robot, or go on; return how it hops in there."""
     if not (folder / "policy.onnx").exists():
         train(recipe, robot, seed, folder, resume=True, threads=1, quiet=True)
     result = read_result(folder)

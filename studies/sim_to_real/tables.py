@@ -19,13 +19,9 @@ _SUMS = ("hops", "skipped_hops", "missed_runs", "body_contacts", "motionless")
 def tabulate(meanings: Mapping[str, str], trials: Sequence[Row]) -> Row:
     """Return medians over twins and seeds, as JSON values.
 
-    Args:
-        meanings: By the methods' names; the others are compared with the first.
-        trials: One row per method, twin, seed and command.
-
-    Returns:
-        ``rows`` has one per method and command, ``methods`` one per method, ``comparison`` the
-        ratios of the methods' errors; ``trials`` are the trials.
+    ``meanings`` are by the methods' names, the first of which the others are compared with;
+    ``trials`` has a row per method, twin, seed and command. Of what is returned, ``rows`` has one
+    per method and command, ``methods`` one per method, ``comparison`` the ratios of their errors.
     """
     rows = []
     for name, meaning in meanings.items():
@@ -42,7 +38,11 @@ def tabulate(meanings: Mapping[str, str], trials: Sequence[Row]) -> Row:
     note = f"{count} twins are too few for intervals over twins; give {LEAST_TWINS} or more."
     return {
         "rows": rows,
-        "methods": [_whole(n, m, _of(trials, "method", n)) for n, m in meanings.items()],
+        "methods": [
+            {**_pooled(name, meaning, own), "ordered": sum(map(_ordered, _runs(own)))}
+            for name, meaning in meanings.items()
+            for own in [_of(trials, "method", name)]
+        ],
         "comparison": [compare(first, other, trials) for other in others],
         "trials": list(trials),
         "notes": [note] if count < LEAST_TWINS else [],
@@ -90,11 +90,6 @@ def _pooled(name: str, meaning: str, trials: Sequence[Row]) -> Row:
         "worst_abs_error_m": max(row[_ERROR] for row in trials),
         **{key: sum(row[key] for row in trials) for key in _SUMS},
     }
-
-
-def _whole(name: str, meaning: str, trials: Sequence[Row]) -> Row:
-    ordered = sum(map(_ordered, _runs(trials)))
-    return {**_pooled(name, meaning, trials), "ordered": ordered}
 
 
 def _ordered(run: Sequence[Row]) -> bool:

@@ -1,7 +1,7 @@
 """Twins, which play the real leg, and what is believed of them without a recording.
 
-A twin brings latency, noise and losses of its own; the paper's disturbance stays off there, as it
-would come on top. A twin without [reality] is met with the paper's disturbance.
+A twin brings latency, noise and losses of its own; the paper's disturbance comes on top, or stays
+off: with ``own`` it meets only legs without [reality].
 """
 
 from collections.abc import Sequence
@@ -50,12 +50,7 @@ def drawn_twin(seed: int, folder: Path) -> Twin:
 
 
 def given_twin(word: str) -> Twin:
-    """Return a shipped robot, or one of a file, as a twin.
-
-    Raises:
-        UsageError: It extends no robot.
-        RobotError: There is no such robot.
-    """
+    """Return a shipped robot, or one of a file, as a twin; UsageError if it extends no robot."""
     robot = load_robot(word)
     robot.require_leg()
     parent = parent_robot(word)
@@ -71,11 +66,7 @@ def find_twins(words: Sequence[str], folder: Path) -> tuple[Twin, ...]:
     """Return twins that were asked for; drawn ones are written to a folder.
 
     A single number draws so many twins, with seeds 0, 1, ...; other words are shipped robots or
-    robot files.
-
-    Raises:
-        UsageError: The number is not positive, or two twins share a name.
-        RobotError: There is no such robot.
+    robot files. UsageError says that there is none, or that two share a name.
     """
     if len(words) == 1 and words[0].isdigit():
         found = tuple(drawn_twin(seed, folder) for seed in range(int(words[0])))

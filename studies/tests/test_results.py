@@ -70,3 +70,7 @@ def test_what_is_stored_is_without_raw_numbers(tmp_path):
     store(file, "hop evaluate")
     assert json.loads(file.read_text()) == {**condensed(raw), "command": "hop evaluate"}
     assert Path(file).read_text().count("\n") == 10
+    file.write_text(json.dumps({"pairs": [{"robot": "a", "hops": 9}] * 99}))
+    store(file, "python")
+    pairs = json.loads(file.read_text())["pairs"]
+    assert pairs == {"columns": ["robot", "hops"], "rows": [["a", 9]] * 99}

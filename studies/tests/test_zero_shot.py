@@ -21,12 +21,13 @@ from studies.sim_to_real.zero_shot import believed_of, pair, summarize
 
 LEG = load_robot("legv2-identified")
 ROW = {"body_contacts": 0, "stop_contacts": 0, "skipped_hops": 0, "std_m": 0.001,
-       "would_be_stopped": False, "reached": True}  # fmt: skip
+       "would_be_stopped": False, "reached": True, "hops": 9, "hops_within_10mm": 8,
+       "missed_hops": 1}  # fmt: skip
 
 
-def row(controller, robot, command, error, **more):
+def row(controller, robot, command, error, noise="on", **more):
     errors = {"median_abs_error_m": error, "mean_abs_error_m": error}
-    place = {"controller": controller, "robot": robot, "command_m": command}
+    place = {"controller": controller, "robot": robot, "command_m": command, "disturbance": noise}
     return {**ROW, **place, **errors, **more}
 
 
@@ -45,30 +46,38 @@ def test_a_leg_that_stands_misses_by_what_it_stands_too_low_and_one_that_hops_by
     assert found["hops"] == 0
     assert found["median_abs_error_m"] == pytest.approx(0.3 - standing.data["height_m"][0, 0])
     assert found["std_m"] is None
+    assert (found["hops_within_10mm"], found["missed_hops"]) == (0, max(found["skipped_hops"], 1))
     hopping = rollout(load_controller("energy-shaping", LEG), config, commands, 0)
     found = pair(hopping, 0, 0.3, LEG)
     assert 3 <= found["hops"] <= 10, "the first five do not count"
     assert found["median_abs_error_m"] < 0.01
+    assert found["hops"] / 2 < found["hops_within_10mm"] <= found["hops"]
     assert not found["would_be_stopped"]
     hopping.data["knee_velocity_rad_s"][500] = 40.0
     assert pair(hopping, 0, 0.3, LEG)["would_be_stopped"]
 
 
-def test_shares_are_of_pairs_that_are_reached_and_closeness_is_pair_by_pair():
+def test_shares_are_of_all_pairs_and_hops_and_closeness_is_pair_by_pair():
     pairs = [
         row("one", "a", 0.3, 0.002),
-        row("one", "a", 0.4, 0.004),
+        row("one", "a", 0.4, 0.004, hops=10, hops_within_10mm=5, missed_hops=0),
         row("one", "b", 0.3, 0.009, would_be_stopped=True),
         row("one", "b", 0.4, 0.5, reached=False),
         row("energy-shaping", "a", 0.3, 0.003),
         row("energy-shaping", "a", 0.4, 0.003),
         row("energy-shaping", "b", 0.3, 0.02),
+        row("energy-shaping-tuned", "a", 0.3, 0.001),
+        row("energy-shaping-tuned", "a", 0.4, 0.001, "off"),
+        row("one", "a", 0.4, 0.1, "off"),
     ]
-    one, shaped = summarize(pairs, ("one", "energy-shaping"))
-    shares = {"within_5mm": 2 / 3, "within_10mm": 1, "would_be_stopped": 1 / 3}
-    expected = {"pairs": 3, "closer_than_energy_shaping": 2 / 3, **shares}
+    one, shaped, *_, undisturbed = summarize(pairs)
+    shares = {"within_5mm": 2 / 4, "within_10mm": 3 / 4, "would_be_stopped": 1 / 4}
+    shares |= {"hops_within_10mm": 29 / 40, "reached_within_10mm": 1}
+    closer = {"closer_than_energy_shaping": 2 / 3, "closer_than_tuned": 0}
+    expected = {"pairs": 4, **shares, **closer}
     assert {name: one[name] for name in expected} == pytest.approx(expected)
-    assert shaped["closer_than_energy_shaping"] == 0
+    assert shaped["closer_than_energy_shaping"] is None
+    assert (undisturbed["disturbance"], undisturbed["within_10mm"]) == ("off", 0)
 
 
 def test_the_command_writes_pairs_and_summary_and_goes_on(tmp_path, capsys):
@@ -77,14 +86,16 @@ def test_the_command_writes_pairs_and_summary_and_goes_on(tmp_path, capsys):
     draw_leg(2).save(robots / "leg-2.toml")
     words = ["zero-shot", "--controllers", "energy-shaping", "--folder", str(robots)]
     words += ["--commands", "0.26", "0.32", "--seconds", "3", "--out", str(tmp_path / "out")]
-    words += ["--json", str(tmp_path / "zero.json")]
+    words += ["--disturbance", "on", "off", "--json", str(tmp_path / "zero.json")]
     assert shared.main("sim_to_real", Options, words) == 0
     found = json.loads((tmp_path / "zero.json").read_text())
-    assert {r["controller"] for r in found["pairs"]} == {"energy-shaping", "mpc-true-state"}
+    tried = {(r["controller"], r["disturbance"]) for r in found["pairs"]}
+    assert tried == {("mpc-true-state", "off"), ("energy-shaping", "on"), ("energy-shaping", "off")}
     assert {r["robot"] for r in found["pairs"]} == {"twin-1", "leg-2"}
     larger = {r["command_m"] for r in found["pairs"] if r["robot"] == "leg-2"}
     assert larger == set(zero_shot.trials.scaled((0.26, 0.32), draw_leg(2).robot))
-    assert [r["controller"] for r in found["summary"]] == ["mpc-true-state", "energy-shaping"]
+    noisy, quiet = found["summary"][1:]
+    assert noisy["median_abs_error_m"] != quiet["median_abs_error_m"]
     trials = sorted((tmp_path / "out" / "trials").glob("*.json"))
     written = [file.stat().st_mtime_ns for file in trials]
     assert shared.main("sim_to_real", Options, words) == 0
