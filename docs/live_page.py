@@ -43,7 +43,7 @@ from hopping_leg.viewer import live_leg
 
 FOLDER = Path(__file__).parent / "live"
 MODULES = sorted(file.stem for file in FOLDER.glob("*.js"))
-CONTROLLERS = ("fast", registry.ENERGY_SHAPING, "universal", "precise", "paper")
+CONTROLLERS = ("fast", registry.ENERGY_SHAPING, "rl", "universal", "paper")
 """In the order of the lists; the first two hop first."""
 
 _PACKAGE = resources.files("hopping_leg")

@@ -175,7 +175,7 @@ def do_all(jobs: Iterable[tuple[Any, ...]], at_once: int = 1) -> list[Row]:
     """Return the results of jobs, each the arguments of ``once``, in processes if several."""
     compile_physics()  # once, before the processes
     with ProcessWorkers(at_once) as workers:
-        return workers.map(once, jobs)
+        return list(workers.map(once, jobs))
 
 
 def show_rows(rows: Iterable[Row], *names: str) -> None:

@@ -7,23 +7,23 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 CEILINGS = {
-    "src/hopping_leg/*.py": (12, 1097),
+    "src/hopping_leg/*.py": (12, 1110),
     "src/hopping_leg/cli/**/*.py": (16, 1865),
     "src/hopping_leg/controllers/**/*.py": (20, 2580),
     "src/hopping_leg/deploy/**/*.py": (20, 3186),
     "src/hopping_leg/emulator/**/*.py": (14, 1835),
-    "src/hopping_leg/envs/**/*.py": (10, 1457),
+    "src/hopping_leg/envs/**/*.py": (10, 1490),
     "src/hopping_leg/evaluate/**/*.py": (13, 2032),
     "src/hopping_leg/formats/**/*.py": (1, 205),
     "src/hopping_leg/identify/**/*.py": (21, 4290),
-    "src/hopping_leg/rl/**/*.py": (19, 2490),
+    "src/hopping_leg/rl/**/*.py": (20, 2770),
     "src/hopping_leg/robot/**/*.py": (13, 1975),
     "src/hopping_leg/sim/**/*.py": (10, 2320),
     "src/hopping_leg/viewer/**/*.py": (6, 1026),
-    "src/**/*.py": (175, 26305),
-    "tests/**/*.py": (136, 13894),
+    "src/**/*.py": (176, 26635),
+    "tests/**/*.py": (137, 14040),
     "studies/**/*.py": (74, 7920),
-    "docs/**/*.md": (22, 2520),
+    "docs/**/*.md": (22, 2530),
     "docs/live/*.js": (13, 1490),
 }
 """Files and lines at most. Who raises one says what users gain by it."""

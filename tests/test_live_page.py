@@ -144,7 +144,7 @@ def draws_of(seed, noisy, jitters):
     ("controller", "robot", "hops"),
     [
         ("fast", "legv2-identified", 3),
-        ("precise", "legv2-identified", 3),
+        ("rl", "legv2-identified", 3),
         ("universal", "legv1", 3),
         ("universal", "twin", 2),
         ("paper", "legv2-paper", 2),
@@ -203,7 +203,7 @@ def test_the_page_obeys(live_page):
         file = {"name": name, "mimeType": "application/octet-stream", "buffer": content}
         page.locator("#file").set_input_files([file])
         page.get_by_text(f"{name} {says}").wait_for()
-    for name in ("universal", "precise", "energy-shaping", "paper", "fast"):
+    for name in ("universal", "rl", "energy-shaping", "paper", "fast"):
         page.get_by_label("Controller", exact=True).select_option(name)
         page.locator("article .name").get_by_text(name, exact=True).first.wait_for()
 
@@ -222,6 +222,6 @@ def test_one_file_holds_everything(page, site):
 
 def test_a_page_with_one_policy_is_small(live):
     pages = live.pages()
-    loaded = [pages["live/index.html"], pages["live/policies/precise.onnx"]]
+    loaded = [pages["live/index.html"], pages["live/policies/rl.onnx"]]
     loaded += [(DOCS / f"live/{name}.js").read_bytes() for name in live.MODULES]
     assert sum(map(len, loaded)) < 600e3

@@ -1,5 +1,6 @@
 """Work shared out gives the same as at home, and nobody works on when its boss is gone."""
 
+import itertools
 import os
 import signal
 import subprocess
@@ -39,9 +40,11 @@ def squares(rows):
 def check_contract(workers):
     """Check what holds for all workers: order, errors as raised, rows in parts."""
     assert workers.count == 2
-    assert workers.map(abs, ((-k,) for k in range(20))) == list(range(20))
+    assert list(workers.map(abs, ((-k,) for k in range(20)))) == list(range(20))
+    endless = workers.map(abs, ((-k,) for k in itertools.count()))
+    assert [next(endless) for _ in range(5)] == [0, 1, 2, 3, 4]
     with pytest.raises(PhysicsError) as caught:
-        workers.map(blow_up, [(7,)])
+        list(workers.map(blow_up, [(7,)]))
     assert str(caught.value) == "Simulation 7 blew up."
     assert type(caught.value) is PhysicsError
     rows = np.arange(10.0).reshape(5, 2)
@@ -52,9 +55,9 @@ def test_processes_give_results_in_order_and_errors_as_they_were_raised():
     with ProcessWorkers(2) as workers:
         check_contract(workers)
     with ProcessWorkers(1) as workers:
-        assert workers.map(os.getpid, [()]) == [os.getpid()]
+        assert list(workers.map(os.getpid, [()])) == [os.getpid()]
     with ProcessWorkers(2) as workers, pytest.raises(UsageError, match="A worker ended early"):
-        workers.map(die, [(0,), (1,)])
+        list(workers.map(die, [(0,), (1,)]))
 
 
 _KILLED = """
@@ -69,7 +72,7 @@ def work(name):
 
 if __name__ == "__main__":
     with ProcessWorkers(2) as workers:
-        workers.map(work, [("first",), ("second",)])
+        list(workers.map(work, [("first",), ("second",)]))
 """
 
 
@@ -103,7 +106,7 @@ def test_a_cluster_of_two_machines_does_the_same_and_a_worker_that_dies_begins_a
     machines.add_node(num_cpus=1)
     try:
         check_contract(RayWorkers(machines.address))
-        assert RayWorkers().map(die_once, [(tmp_path / "mark",)]) == ["lived"]
+        assert list(RayWorkers().map(die_once, [(tmp_path / "mark",)])) == ["lived"]
     finally:
         ray.shutdown()
         machines.shutdown()

@@ -21,7 +21,7 @@ COMMAND = "#737373"
 """Of commanded heights."""
 
 _OF_CONTROLLERS = {
-    "precise": "#0072B2",
+    "rl": "#0072B2",
     "energy-shaping": "#D55E00",
     "fast": "#009E73",
     "universal": "#CC79A7",

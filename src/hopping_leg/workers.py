@@ -4,7 +4,8 @@ import os
 import signal
 import socket
 import threading
-from collections.abc import Callable, Iterable
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
@@ -18,6 +19,7 @@ from hopping_leg.errors import HoppingLegError, UsageError
 
 P = ParamSpec("P")
 R = TypeVar("R")
+T = TypeVar("T")
 
 _PATIENCE = 5.0  # how long an address may take to answer, s
 
@@ -43,16 +45,18 @@ class ProcessWorkers:
         """Begin a call in a process of its own, as soon as one is free."""
         return self._pool.submit(function, *args, **kwargs)
 
-    def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> list[R]:
-        """Call a function once per tuple of arguments; return what it returns, in their order.
+    def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> Iterator[R]:
+        """Call a function once per tuple of arguments; yield what it returns, in their order.
 
-        A task's HoppingLegError is raised here, UsageError where a worker died.
+        Arguments are taken as workers get free, so that they may be endless. A task's
+        HoppingLegError is raised here, UsageError where a worker died.
         """
         if self.count == 1:
-            return [function(*values) for values in arguments]
-        futures = [self.submit(function, *values) for values in arguments]
+            yield from (function(*values) for values in arguments)
+            return
+        begun = (self.submit(function, *values) for values in arguments)
         try:
-            return [future.result() for future in futures]
+            yield from _in_order(begun, Future.result, self.count)
         except BrokenProcessPool as error:
             raise UsageError(
                 "A worker ended early; call the same command again to go on."
@@ -104,11 +108,12 @@ class RayWorkers:
                 ) from error
         self.count = max(1, int(ray.cluster_resources().get("CPU", 1)))
 
-    def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> list[R]:
+    def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> Iterator[R]:
         """As ``ProcessWorkers`` does; a task that dies begins again, the function is sent once."""
         sent, task = self._ray.put(function), self._ray.remote(_call)
+        begun = (task.remote(sent, *values) for values in arguments)
         try:
-            return list(self._ray.get([task.remote(sent, *values) for values in arguments]))
+            yield from _in_order(begun, self._ray.get, self.count)
         except self._ray.exceptions.RayTaskError as error:
             if isinstance(error.cause, HoppingLegError):
                 raise error.cause from None
@@ -118,6 +123,16 @@ class RayWorkers:
                 f"A worker of the Ray cluster died: {str(error).splitlines()[0].rstrip('.')}; call"
                 " the same command again to go on."
             ) from error
+
+
+def _in_order(begun: Iterator[T], result: Callable[[T], R], count: int) -> Iterator[R]:
+    """Yield results in the order in which they were begun, twice ``count`` ahead."""
+    waiting: deque[T] = deque()
+    for task in begun:
+        waiting.append(task)
+        if len(waiting) == 2 * count:
+            yield result(waiting.popleft())
+    yield from map(result, waiting)
 
 
 def _call(function: Callable[..., Any], *values: Any) -> Any:  # noqa: ANN401
@@ -138,4 +153,4 @@ Workers = ProcessWorkers | RayWorkers
 def map_rows(workers: Workers, function: Callable[[Array], Array], rows: Array) -> Array:
     """Return what a function of independent rows (n, k) returns, computed in about equal parts."""
     parts = np.array_split(rows, min(workers.count, len(rows)))
-    return np.concatenate(workers.map(function, ((part,) for part in parts)))
+    return np.concatenate(list(workers.map(function, ((part,) for part in parts))))

@@ -1,6 +1,5 @@
-"""What is each part of a distillation worth, and what do other teachers teach?"""
+"""What is each part of a distillation worth?"""
 
 RESULTS = (
-    "python -m studies.ablations --seeds 0 1 --steps 600000 --json "
-    "studies/ablations/results/ablations.json",
+    "python -m studies.ablations --seeds 0 1 --json studies/ablations/results/ablations.json",
 )

@@ -1,4 +1,4 @@
-"""What each part of `fast` is worth, and other ways to teach or to refine it.
+"""What each part of `fast` is worth.
 
 Every variant is trained with several seeds for the same number of steps and judged on seeds that
 chose nothing.
@@ -17,73 +17,31 @@ from hopping_leg.controllers.policy import Card
 from hopping_leg.envs.observation import make_observation
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.runner import software_versions
-from hopping_leg.rl.onnx_export import Actor, build_policy
+from hopping_leg.rl.onnx_export import build_policy
 from hopping_leg.rl.policy_evaluation import calibrate
 from hopping_leg.rl.reach import within_reach
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
-from studies.ablations import ppo
 from studies.shared import Row, once, show_rows
 from studies.time_to_accuracy.run import JUDGING_SEEDS, judge
 
-Train = Callable[[Recipe, Robot, int], Actor]
-
-
-def _learn(learner: Any, recipe: Recipe) -> Any:  # noqa: ANN401
-    learner.train_until(recipe.schedule.steps, lambda: True, recipe.schedule.log_every)
-    return learner
-
-
-def distilled(recipe: Recipe, robot: Robot, seed: int) -> Actor:
-    """Return the student of a distillation."""
-    network: Actor = _learn(recipe.make_learner(robot, seed), recipe).network()
-    return network
-
-
-def taught_by_ppo(recipe: Recipe, robot: Robot, seed: int) -> Actor:
-    """Return a student whose teacher has learnt by PPO for five times the student's steps."""
-    make = ppo.learn_teacher(recipe, robot, seed, 5 * recipe.schedule.steps)
-    learner: Any = recipe.make_learner(robot, seed)
-    learner.teacher = make(learner.task)
-    network: Actor = _learn(learner, recipe).network()
-    return network
-
-
-def refined(recipe: Recipe, robot: Robot, seed: int) -> Actor:
-    """Return a student that goes on by PPO for half as many steps again."""
-    learner = _learn(recipe.make_learner(robot, seed), recipe)
-    return ppo.refine(learner, recipe, robot, seed, recipe.schedule.steps // 2)
-
-
-VARIANTS: dict[str, tuple[str, dict[str, Any], Train]] = {
-    "recipe": ("the recipe", {}, distilled),
+VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {
+    "recipe": ("the recipe", {}),
     "gru": (
         "50 ms of samples and a gated recurrent unit instead of 0.7 s",
         {"task.observation": "dated", "memory": "gru"},
-        distilled,
     ),
-    "short-past": (
-        "50 ms of samples instead of 0.7 s",
-        {"task.observation": "dated"},
-        distilled,
-    ),
+    "short-past": ("50 ms of samples instead of 0.7 s", {"task.observation": "dated"}),
     "three-samples": (
         "the paper's three samples, which do not tell their age",
         {"task.observation": "three-samples"},
-        distilled,
     ),
-    "small": ("two layers of 64 and 64", {"hidden": (64, 64)}, distilled),
-    "no-help": ("a student that hops alone from the start", {"mixing_share": 1e-9}, distilled),
-    "no-calibration": ("the command as it is", {"calibrations": 0}, distilled),
-    "learnt-teacher": (
-        "a teacher that has learnt by PPO, five times as long",
-        {},
-        taught_by_ppo,
-    ),
-    "refined": ("the recipe, then PPO for half as long again", {}, refined),
+    "small": ("two layers of 64 and 64", {"hidden": (64, 64)}),
+    "no-help": ("a student that hops alone from the start", {"mixing_share": 1e-9}),
+    "no-calibration": ("the command as it is", {"calibrations": 0}),
 }
-"""By name: in words, what is changed, and how it is trained."""
+"""By name: in words, and what is changed."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +52,7 @@ class Ablation:
     """Names of those to train."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """One training of every variant each."""
-    steps: int = 1_200_000
+    steps: int = 500_000
     """Control steps of experience of each."""
     robot: RobotFile = DEFAULT_ROBOT
     out: Path = Path("runs/ablations")
@@ -111,12 +69,12 @@ class Ablation:
         usual, _ = within_reach(FAST.replace(steps=self.steps).fit(robot), robot)
         rows = []
         for name in self.variants:
-            meaning, changes, train = VARIANTS[name]
+            meaning, changes = VARIANTS[name]
             recipe = usual.replace(changes)
             asked = {"recipe": repr(recipe), "robot": robot.digest}
             for seed in self.seeds:
                 file = self.out / f"{name}-{seed}.json"
-                found = once(file, asked, judged, recipe, robot, seed, train)
+                found = once(file, asked, judged, recipe, robot, seed)
                 rows.append({"variant": name, "meaning": meaning, "seed": seed, **found})
         lengths = ("mean_abs_median_error_m", "worst_abs_median_error_m", "mean_std_m")
         show_rows(rows, "variant", "seed", *lengths, "skipped_hops")
@@ -130,16 +88,17 @@ class Ablation:
         }
 
 
-def judged(recipe: Recipe, robot: Robot, seed: int, train: Train) -> Row:
+def judged(recipe: Recipe, robot: Robot, seed: int) -> Row:
     """Train a policy and judge it."""
     torch.set_num_threads(1)
-    network, (low, high) = train(recipe, robot, seed), recipe.task.command_bounds
+    learner, (low, high) = recipe.make_learner(robot, seed), recipe.task.command_bounds
+    learner.train_until(recipe.schedule.steps, lambda: True, recipe.schedule.log_every)
     card = Card(
         recipe.name, recipe.task.observation, low, high, recipe.task.action_torque, robot.name,
         robot.digest, recipe.task.rate, seed,
     )  # fmt: skip
     seen = make_observation(robot, recipe.task, 1)
-    content = build_policy(network, seen, card)
+    content = build_policy(learner.network(), seen, card)
     rounds = recipe.selection.calibrations
     if rounds:
         content = calibrate(content, robot, rounds)

@@ -1,6 +1,6 @@
 """Results of `hop evaluate` for the shipped controllers."""
 
-_EVERY_CM = ",".join(f"{0.22 + 0.01 * step:.2f}" for step in range(20))
+_HEIGHTS = ",".join(f"{0.22 + 0.01 * step:.2f}" for step in range(20))
 """Heights from 0.22 to 0.41 m."""
 
 _BASELINES = "energy-shaping energy-shaping-flying"
@@ -14,9 +14,9 @@ def _trials(controllers: str, name: str, options: str) -> str:
     return f"hop evaluate {controllers} {options} --json studies/evaluation/results/{name}"
 
 
-def _precise(policy: str, name: str, options: str = "") -> str:
-    options = f"--seeds 5 --floor soft --commands {_EVERY_CM} {options}".strip()
-    return _trials(f"{policy} {_BASELINES}", f"{name}.json", options)
+def _every_cm(name: str, options: str = "") -> str:
+    options = f"--seeds 5 --floor soft --commands {_HEIGHTS} {options}".strip()
+    return _trials(f"rl fast {_BASELINES}", f"{name}.json", options)
 
 
 def _universal(robot: str) -> str:
@@ -30,15 +30,15 @@ LEGS = ("legv2-identified", "legv2", "legv2-paper", "legv1")
 
 RESULTS = (
     _trials(
-        f"fast precise universal {_BASELINES} energy-shaping-literal", "evaluation.json",
+        f"rl fast universal {_BASELINES} energy-shaping-literal", "evaluation.json",
         "--seeds 10 --floor soft --traces runs/results/traces",
     ),
     "hop report runs/results/traces/*.parquet --out studies/evaluation/figures",
     _trials(f"paper {_BASELINES} energy-shaping-literal", "paper.json", "--seeds 10"),
     *(_universal(robot) for robot in LEGS),
-    _precise("precise", "precise"),
-    _precise("precise", "precise_fine_step", "--timestep 3.125e-05"),
-    _precise("precise", "precise_no_soft_limits", "--no-soft-limits"),
+    _every_cm("every_cm"),
+    _every_cm("every_cm_fine_step", "--timestep 3.125e-05"),
+    _every_cm("every_cm_no_soft_limits", "--no-soft-limits"),
     f"hop evaluate fast universal energy-shaping --seeds 3 --seed {_FRESH} "
     "--suite robustness --out runs/results/robustness "
     "--json studies/evaluation/results/robustness.json",

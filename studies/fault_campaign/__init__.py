@@ -1,6 +1,6 @@
 """Is the leg safe whatever fails?"""
 
-_TRY = "python -m studies.fault_campaign --controllers fast precise energy-shaping"
+_TRY = "python -m studies.fault_campaign --controllers fast rl energy-shaping"
 
 _SHOWN = "'dropped reply' 'corrupted reply' 'late reply' 'duplicated reply' 'total loss'"
 _SHOWN += " 'garbage line' 'encoder jump' 'encoder drift' 'drive fault' over-temperature"
@@ -19,7 +19,7 @@ RESULTS = (
     " --json studies/fault_campaign/results/real_time.json",
     "python -m studies.fault_campaign --controllers fast energy-shaping universal --live 0"
     f" --seed 11 --repeats 372 --families {_LIES} --json studies/fault_campaign/results/lies.json",
-    "python -m studies.fault_campaign --controllers fast precise universal paper energy-shaping"
+    "python -m studies.fault_campaign --controllers fast rl universal paper energy-shaping"
     " --live 0 --seed 11 --repeats 200 --families 'no fault'"
     " --json studies/fault_campaign/results/healthy.json",
 )

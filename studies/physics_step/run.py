@@ -26,7 +26,7 @@ TOLERANCE = 0.5e-3
 class PhysicsStep:
     """Let controllers hop at physics steps from 0.5 to 0.031 ms, each half of the one before."""
 
-    controllers: tuple[str, ...] = ("energy-shaping", "paper", "fast", "precise")
+    controllers: tuple[str, ...] = ("energy-shaping", "paper", "fast", "rl")
     """Whose hops are compared; a policy hops on the robot that it was trained on alone."""
     robots: tuple[str, ...] = ("legv2", "legv2-paper", "legv2-identified")
     """Shipped names or paths of .toml files."""

@@ -4,22 +4,19 @@ import itertools
 import json
 from operator import attrgetter
 
-import numpy as np
 import pytest
 
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 
-import torch
-from tests.rl.learners import ROBOT, TINY_FAST, learn, learner, try_briefly
+from tests.rl.learners import ROBOT, TINY_FAST, try_briefly
 
+from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes.fast import FAST
-from studies.ablations import ppo
 from studies.ablations import run as module
-from studies.ablations.run import VARIANTS, Ablation, distilled
+from studies.ablations.run import VARIANTS, Ablation
 from studies.shared import main
 
 ROLLOUT = TINY_FAST.algorithm.n_steps * TINY_FAST.schedule.num_envs
-PPO_ROLLOUT = 64 * TINY_FAST.schedule.num_envs
 
 
 @pytest.fixture
@@ -30,25 +27,21 @@ def tiny(monkeypatch):
     try_briefly(monkeypatch)
     trained = []
 
+    make = Recipe.make_learner
+
     def noted(recipe, robot, seed):
         trained.append((recipe.network.hidden, recipe.schedule.steps, seed))
-        return learner(recipe, seed, robot).network()
+        return make(recipe, robot, seed)
 
-    for name in ("recipe", "small"):
-        meaning, changes, _ = VARIANTS[name]
-        monkeypatch.setitem(VARIANTS, name, (meaning, changes, noted))
+    monkeypatch.setattr(Recipe, "make_learner", noted)
     return trained
 
 
-def weights(network):
-    return [p.detach().numpy().copy() for p in network.parameters()]
-
-
 def test_variants_differ_from_the_recipe_and_from_each_other_in_what_they_name():
-    made = [(FAST.replace(changes), train) for _, changes, train in VARIANTS.values()]
+    made = [FAST.replace(changes) for _, changes in VARIANTS.values()]
     assert len({repr(variant) for variant in made}) == len(VARIANTS)
-    assert made[0] == (FAST, distilled)
-    for (recipe, _), (_, changes, _) in zip(made, VARIANTS.values(), strict=True):
+    assert made[0] == FAST
+    for recipe, (_, changes) in zip(made, VARIANTS.values(), strict=True):
         paths = {n: attrgetter(path) for n, path in FAST.paths().items()}
         differing = {n for n, value in paths.items() if value(recipe) != value(FAST)}
         assert differing == set(changes)
@@ -79,34 +72,3 @@ def test_a_variant_is_summed_up_over_seeds_its_worst_height_being_that_of_any():
     assert [first[key] for key in keys] == pytest.approx([0.003, 0.010, 0.005, 4])
     assert first["body_contact_ticks"] == 2
     assert second["runs"] == 1
-
-
-@pytest.fixture(scope="module")
-def teachers():
-    """Return two teachers of one seed and one of another."""
-    torch.set_num_threads(1)
-    return [ppo.learn_teacher(TINY_FAST, ROBOT, seed, 2 * PPO_ROLLOUT) for seed in (0, 0, 1)]
-
-
-def test_a_teacher_that_learns_acts_by_the_true_state_and_its_seed(teachers):
-    task = learner(TINY_FAST).task
-    first, same, other = (make(task).torque(task.command) for make in teachers)
-    assert first.shape == (task.count, 2)
-    np.testing.assert_array_equal(first, same)
-    assert not np.allclose(first, other)
-    task.legs.height += 0.05
-    assert not np.allclose(teachers[0](task).torque(task.command), first)
-    eager = teachers[2](task)
-    torch.nn.init.constant_(eager._policy.action_net.bias, 9.0)
-    np.testing.assert_allclose(eager.torque(task.command), [task.options.action_torque] * 4)
-
-
-def test_refinement_begins_at_the_students_weights_and_leaves_them():
-    made = learn(learner(TINY_FAST), 2 * ROLLOUT)
-    student = weights(made.network())
-    begun, gone_on = (
-        weights(ppo.refine(made, TINY_FAST, ROBOT, 0, steps)) for steps in (0, PPO_ROLLOUT)
-    )
-    for ours, theirs, later in zip(begun, student, gone_on, strict=True):
-        np.testing.assert_allclose(ours, theirs, atol=1e-6)
-        assert not np.allclose(later, theirs, atol=1e-6)

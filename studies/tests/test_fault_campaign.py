@@ -123,7 +123,7 @@ def test_a_false_alarm_of_a_healthy_leg_is_a_problem(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_trial_of_each_family_is_safe(family):
-    for controller in ("precise", "energy-shaping"):
+    for controller in ("rl", "energy-shaping"):
         row = play_case(Case(family, controller, robot_of([controller]), 1, 0))
         assert row["problems"] == [], row
         assert row["began"] is not None

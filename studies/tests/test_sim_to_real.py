@@ -43,7 +43,7 @@ def main(words):
         (["--twins", "legv2"], "extends no robot"),
         (["--jobs", "0"], "--jobs is 0"),
         (["--seconds", "1"], "--seconds is 1"),
-        (["--recipe", "precis"], "Did you mean 'precise'"),
+        (["--recipe", "pape"], "Did you mean 'paper'"),
     ],
 )
 def test_bad_options_are_a_sentence_before_anything_runs(tmp_path, capsys, words, says):

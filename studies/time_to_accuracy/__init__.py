@@ -7,7 +7,8 @@ RESULTS = (
         f"python -m studies.time_to_accuracy --recipes {recipes} --seeds {seeds} --json "
         f"{_RESULTS}/{name}.json --figure {_FIGURES}/{name}.svg"
         for name, recipes, seeds in (
-            ("distillation", "fast precise", "0 1 2"),
+            ("rl", "rl", "0 1 2 3 4"),
+            ("distillation", "fast", "0 1 2"),
             ("reinforcement_learning", "paper sb3-ppo sb3-sac", "1"),
         )
     ),

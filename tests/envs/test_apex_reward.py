@@ -80,6 +80,26 @@ def test_energy_gain_fades_and_can_end_where_the_hop_would_be_too_high(reward):
     assert high[0] == high[1] == low[1]
 
 
+def test_joints_pay_near_their_limits_and_more_once_the_leg_hops():
+    reward, robot = make(ApexRewardConfig(limits=(1.0, 10.0))), load_robot("legv2-paper")
+    for limit, inwards in ((robot.of_joints("lower"), 1), (robot.of_joints("upper"), -1)):
+        assert term(reward, "limits", q=limit + inwards * 0.051) == 0.0
+        assert term(reward, "limits", q=limit - inwards * 0.01) == pytest.approx(0.12)
+    inside, outside = transition(), transition(q=robot.of_joints("upper"))
+    paid = []
+    for share in (0.0, 0.25, 0.5, 1.0):
+        reward.anneal(share)
+        paid.append((reward(inside)[0] - reward(outside)[0])[0] / 0.1 / CONFIG.scale)
+    np.testing.assert_allclose(paid, [1.0, 5.5, 10.0, 10.0])
+
+
+def test_reversals_of_torque_are_counted():
+    reward = make(ApexRewardConfig(reversals=1.0))
+    turns = {((0.15, 0.5), (-0.15, -0.5)): 2, ((0.05, 0), (-0.05, 0.5)): 0, ((0.9, 0), (0.1, 0)): 0}
+    for (action, last), count in turns.items():
+        assert term(reward, "reversals", action=action, last=last) == count
+
+
 def test_coming_close_to_the_ground_costs(reward):
     assert term(reward, "clearance", 0.2, 0.0) == 0.0
     near, touching = (term(reward, "clearance", height, 0.0) for height in (0.15, 0.13))

@@ -5,6 +5,7 @@ import pytest
 
 from hopping_leg.controllers import robot_numbers
 from hopping_leg.envs import HoppingTask, Reward, TaskConfig, TaskLeg, paper_reward
+from hopping_leg.envs.apex_reward import ballistic_apex
 from hopping_leg.envs.observation import sample_scaling
 from hopping_leg.errors import UsageError
 from hopping_leg.hop_detection import find_hops
@@ -77,6 +78,20 @@ def test_episodes_end_on_time_and_the_last_observation_is_kept():
             assert (step.height != timed.legs.height).all()
         else:
             assert step.final_observation is None
+
+
+def test_a_critic_sees_the_apex_in_sight_the_last_action_and_the_time_since_an_apex():
+    hopper = task(TaskConfig(action_torque=(10, 20), disturbance=NO_NOISE), count=3)
+    since, apexes = np.zeros(3), 0
+    for action in actions(200, 3):
+        step, legs = hopper.step(action), hopper.legs
+        excess = ballistic_apex(legs.height, legs.height_rate) - hopper.command
+        since = np.where(np.isnan(step.apex_error), since + 1 / 200, 0.0)
+        apexes += np.count_nonzero(since == 0)
+        seen = [np.clip(excess / 0.05, -3, 3), np.exp(-np.abs(excess) / 0.02)]
+        seen = np.stack([*seen, np.sign(legs.height_rate), *action.clip(-1, 1).T, since], axis=1)
+        np.testing.assert_allclose(hopper.privileged()[:, 10:], seen, rtol=1e-5, atol=1e-6)
+    assert apexes > 3
 
 
 def test_commands_come_from_the_paper_or_a_range_and_switch_on_time():

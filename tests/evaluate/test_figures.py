@@ -19,12 +19,12 @@ def test_controllers_beside_each_other_share_their_axes_and_keep_their_colours(f
     assert flight.get_xlim() == other.get_xlim()
     assert flight.get_ylim() == other.get_ylim()
     assert flight.collections[0].get_clim() == other.collections[0].get_clim()
-    own = controller_colours(["precise"])["precise"]
-    for names in (["mine", "precise"], ["precise", "mine"]):
-        first = names.index("precise")
+    own = controller_colours(["rl"])["rl"]
+    for names in (["mine", "rl"], ["rl", "mine"]):
+        first = names.index("rl")
         drawn = drawing.draw_heights(dict.fromkeys(names, fixed)).axes[first].lines[0]
         assert drawn.get_color() == own
-    five = ["mine", "precise", "a", "b", "energy-shaping"]
+    five = ["mine", "rl", "a", "b", "energy-shaping"]
     assert len(set(controller_colours(five).values())) == 5
 
 

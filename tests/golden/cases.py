@@ -145,7 +145,7 @@ _STUDENT = ["n_steps=32", "batch_size=64", "gradient_steps=4", "mixing_share=0.5
 RECIPES = {
     "paper": ["train_freq=32", "learning_starts=64", "gradient_steps=4", "batch_size=32"],
     "fast": _STUDENT,
-    "precise": [*_STUDENT, "task.timestep=0.0005"],
+    "rl": ["n_steps=32", "batch_size=64"],
     "surprised": [*_STUDENT, "calibrations=1"],
     "recurrent": [*_STUDENT, "memory=gru"],
 }
@@ -153,7 +153,7 @@ RECIPES = {
 
 MADE = {
     "surprised": ("--recipe", "fast", "--randomise", "surprises", "--heights", 0.25, 0.3),
-    "recurrent": ("--recipe", "precise", "--observation", "dated", "--heights", 0.25, 0.3),
+    "recurrent": ("--recipe", "fast", "--observation", "dated", "--heights", 0.25, 0.3),
 }
 
 

@@ -9,6 +9,7 @@ from hopping_leg.rl import policy_evaluation, reach
 from hopping_leg.rl.onnx_export import build_policy
 from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.rl.recipes.paper import PAPER
+from hopping_leg.rl.recipes.rl import RL
 from hopping_leg.rl.recipes.universal import UNIVERSAL
 from hopping_leg.robot import COARSE_TIMESTEP, DEFAULT_ROBOT, load_robot
 from hopping_leg.sim.any_leg import draw_any_leg
@@ -30,7 +31,12 @@ STUDENTS = {
     "gru": TINY_FAST.replace(memory="gru"),
     "surprised": TINY_FAST.replace({"task.randomised": WIDE_RANGES}),
 }
-EVERY = {"sac": TINY, **STUDENTS}
+TINY_RL = RL.replace(
+    {"task.timestep": COARSE_TIMESTEP},
+    num_envs=4, steps=768, n_steps=16, batch_size=32, actor=(8, 8), critic=(8, 8), calibrations=1,
+    heights=(0.28, 0.32), eval_commands=(0.28, 0.32),
+)  # fmt: skip
+EVERY = {"sac": TINY, "ppo": TINY_RL, **STUDENTS}
 TINY_UNIVERSAL = UNIVERSAL.replace(
     num_envs=4, steps=2048, n_steps=32, buffer_size=512, gradient_steps=4, batch_size=64,
     hidden=(8,), size=8, mixing_share=0.4, eval_commands=(0.28, 0.32),

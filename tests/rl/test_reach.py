@@ -33,15 +33,15 @@ class Here:
         pass
 
     def map(self, function, arguments):
-        self.asked += [str(values[0]) for values in arguments]
-        return [function(*values) for values in arguments]
+        for values in arguments:
+            self.asked.append(str(values[0]))
+            yield function(*values)
 
 
 @pytest.fixture(autouse=True)
 def here(monkeypatch):
     workers = Here()
     monkeypatch.setattr(reach, "_AT_ONCE", 2)
-    monkeypatch.setattr(reach, "_ROUND", 4)
     monkeypatch.setattr(reach, "ProcessWorkers", lambda _: workers)
     return workers
 
@@ -101,6 +101,11 @@ def with_motors(**factors):
         motor = dataclasses.replace(joint.motor, **numbers)
         joints[name] = dataclasses.replace(joint, motor=motor)
     return dataclasses.replace(ROBOT, name="changed", **joints)
+
+
+def test_a_recipe_without_drawn_legs_has_nothing_for_a_cluster(tmp_path):
+    with pytest.raises(UsageError, match="the recipe fast has none; leave it out"):
+        find_legs(FAST, 0, tmp_path / "legs.json", 1, "local", print)
 
 
 def test_a_recipe_without_a_teacher_stays_as_it_is():

@@ -6,7 +6,7 @@ nothing had happened.
 
 Examples:
   hop train --recipe fast --minutes 5
-  hop train --recipe precise --robot legv2
+  hop train --recipe rl --robot legv2
   hop train --recipe paper --seed 1 --out runs/mine
   hop train --recipe paper --seed 1 --out runs/mine --resume
   hop evaluate runs/mine/policy.onnx
@@ -28,7 +28,7 @@ class Options:
     """What to train and where to keep it."""
 
     recipe: str = "fast"
-    """Recipe: `fast` for accurate hopping soon, `precise` for more accurate hopping later,
+    """Recipe: `rl` for reinforcement learning from nothing, `fast` for imitation of a teacher,
     `universal` for one policy on any leg, `paper` for the paper's method; or FILE.py:NAME, a recipe
     of your own."""
     robot: str | None = None

@@ -9,13 +9,14 @@ the motion and fades out; kernels narrow while training proceeds. The paper's pe
 one keeps body and knee off the ground.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.envs.paper_reward import jerk_term, position_term
+from hopping_leg.envs.paper_reward import jerk_term
 from hopping_leg.envs.rewards import LastingTerm, Reward, RewardTerm, Transition, sum_of_joints
 from hopping_leg.robot import Robot, kinematics
 
@@ -26,7 +27,9 @@ TOUCH = 3.0
 _FASTEST_SQUARED = 4.0  # base velocity squared beyond which the energy gain grows no more, m2/s2
 _PREDICTION_WIDTHS = (0.015, 0.06)  # widths of the two kernels around the predicted apex, m
 _FULL_AIR, _FULL_PERIOD = 0.1, 0.45  # time in the air and since the last apex for full weight, s
-_SHARP_FROM, _ENERGY_UNTIL = 0.7, 0.35  # shares of the training: least width, no more energy gain
+_SHARP_FROM, _FULL_PRICE, _ENERGY_UNTIL = 0.7, 0.5, 0.35
+"""Shares of the training: least width, highest prices, no more energy gain."""
+_LIMIT_MARGIN, _REVERSAL = 0.05, 0.2  # rad within joint limits; change of an action
 _SPEED = 20.0  # joint speed that costs nothing, rad/s
 _BASE_MARGIN, _KNEE_MARGIN, _TOUCH_MARGIN = 0.04, 0.02, 0.006  # gaps to the ground, m
 
@@ -53,8 +56,12 @@ class ApexRewardConfig:
     """Weight of the paper's Pj."""
     effort: float = 0.0
     """Weight of the actions' squares in flight, where they move nothing but the leg itself."""
-    position: float = 0.02
-    """Weight of the paper's Pjp."""
+    reversals: float = 0.0
+    """Weight of changes of an action's sign by more than 0.2; it rises from none until half of the
+    training."""
+    limits: tuple[float, float] = (1.0, 1.0)
+    """Weight of how far joints are outside of 0.05 rad within their limits, rad, at the start and
+    from half of the training on."""
     velocity: float = 0.005
     """Weight of joint speed beyond what a hop needs."""
     clearance: float = 1.0
@@ -64,12 +71,26 @@ class ApexRewardConfig:
 def apex_reward(robot: Robot, config: ApexRewardConfig, rate: float) -> Reward:
     """Return the reward that judges ticks by predicted and reached apexes; rate is in Hz."""
     c = config
+    lower = robot.of_joints("lower")[None] + _LIMIT_MARGIN
+    upper = robot.of_joints("upper")[None] - _LIMIT_MARGIN
 
     def bounded_energy_gain(t: Transition) -> Array:
         most: float | Array = _FASTEST_SQUARED
         if c.energy_beyond > 0:
-            most = most * np.exp(-np.maximum(ballistic_apex(t) - t.command, 0.0) / c.energy_beyond)
+            beyond = np.maximum(ballistic_apex(t.height, t.rate) - t.command, 0.0)
+            most = most * np.exp(-beyond / c.energy_beyond)
         return np.minimum(np.square(t.rate), most)
+
+    def price(first: float, last: float) -> Callable[[float], float]:
+        return lambda share: -(first + (last - first) * min(1.0, share / _FULL_PRICE))
+
+    def reversals(t: Transition) -> Array:
+        turned = t.action * t.last_action < 0
+        far = np.abs(t.action - t.last_action) > _REVERSAL
+        return sum_of_joints((turned & far).astype(np.float64))
+
+    def excess(t: Transition) -> Array:
+        return sum_of_joints(np.maximum(lower - t.q, 0.0) + np.maximum(t.q - upper, 0.0))
 
     def ground_closeness(t: Transition) -> Array:
         base = kinematics.base_clearance(robot, t.height)
@@ -90,7 +111,8 @@ def apex_reward(robot: Robot, config: ApexRewardConfig, rate: float) -> Reward:
             RewardTerm(
                 "effort", -c.effort, lambda t: sum_of_joints(np.square(t.action)) * t.flying
             ),
-            position_term(robot, c.position),
+            RewardTerm("reversals", price(0.0, c.reversals), reversals),
+            RewardTerm("limits", price(*c.limits), excess),
             RewardTerm(
                 "velocity",
                 -c.velocity,
@@ -149,14 +171,14 @@ class ApexEvent(LastingTerm):
         self._air, self._since = np.array(state["air"]), np.array(state["since"])
 
 
-def ballistic_apex(t: Transition) -> Array:
-    """Return the height that the base reaches without the ground, m."""
-    return t.height + np.square(t.rate) / (2 * GRAVITY)
+def ballistic_apex(height: Array, rate: Array) -> Array:
+    """Return the height that a base reaches without the ground, m, from its height and velocity."""
+    return height + np.square(rate) / (2 * GRAVITY)
 
 
 def predicted_apex_accuracy(t: Transition) -> Array:
     """Return base speed times how near the ballistic apex is to the command, 0 on the ground."""
-    error = np.abs(ballistic_apex(t) - t.command)
+    error = np.abs(ballistic_apex(t.height, t.rate) - t.command)
     narrow, wide = _PREDICTION_WIDTHS
     kernel = np.exp(error / -narrow) + 0.5 * np.exp(error / -wide)
     return np.abs(t.rate) * kernel * t.flying

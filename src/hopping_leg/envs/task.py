@@ -14,6 +14,7 @@ from hopping_leg.arrays import Array, Array32, BoolArray, IntArray
 from hopping_leg.controllers import robot_numbers
 from hopping_leg.controllers.observation_history import AnyLeg
 from hopping_leg.envs import rewards, task_config
+from hopping_leg.envs.apex_reward import ballistic_apex
 from hopping_leg.envs.initial_states import InitialStates
 from hopping_leg.envs.observation import make_observation, sample_scaling
 from hopping_leg.robot import Robot
@@ -21,8 +22,9 @@ from hopping_leg.sim import LegSimulator, Measurement, Plant, randomization
 from hopping_leg.sim.compiled import compiled
 
 _RECENT = 500  # Hops that count as the latest
-_PRIVILEGED = 10  # Entries of the true state, where all legs are the same
+_PRIVILEGED = 16  # Entries of the true state, where all legs are the same
 _CLEARANCE_GAIN = 10.0  # scale of clearances in there, 1/m
+_EXCESS, _NEAR = 0.05, 0.02  # scales of what the apex in sight misses, m
 
 
 @dataclass(frozen=True)
@@ -114,6 +116,7 @@ class HoppingTask:
         self._end = np.empty(count, np.int64)
         self._switch = np.full(count, np.iinfo(np.int64).max)
         self.last_action, self._rises = np.zeros((count, 2)), np.zeros(count, np.bool_)
+        self._since_apex = np.zeros(count)
         self._recent_errors: deque[float] = deque(maxlen=_RECENT)
         self.reset()
 
@@ -210,11 +213,13 @@ class HoppingTask:
     def _find_apexes(self, transition: rewards.Transition, height_before: Array) -> Array:
         """Set the transition's apexes; return their errors."""
         rose, self._rises = self._rises, np.empty(self.count, np.bool_)
+        self._since_apex += 1 / self.options.rate
         if not _update_rises(self.legs.state, rose, self._rises):
             return self._nan
         apex = hop_detection.at_apex(rose, self._rises, transition.foot_clearance)
         height = np.where(apex, np.maximum(height_before, transition.height), np.nan)
         transition.apex, transition.apex_height = apex, height
+        self._since_apex[apex] = 0.0
         error: Array = height - transition.command
         self._recent_errors.extend(error[apex].tolist())
         return error
@@ -222,10 +227,13 @@ class HoppingTask:
     def privileged(self) -> Array32:
         """Return normalised true states, (n, size).
 
-        Base height and rate, q (2), qd (2), command, clearance of foot, knee and base, and where
-        the legs' numbers lie in their ranges; the base's height is scaled like the command.
+        Base height and rate, q (2), qd (2), command, clearance of foot, knee and base; how far the
+        base would rise above the command without the ground, how near that is to it, and whether it
+        rises; last action (2), time since the last apex, and where the legs' numbers lie in their
+        ranges. The base's height is scaled like the command.
         """
         legs, (offset, gain) = self.legs, self._scaling
+        excess = ballistic_apex(legs.height, legs.height_rate) - self.command
         out = np.empty((self.count, self.privileged_size), np.float32)
         out[:, 0] = (legs.height - offset[4]) * gain[4]
         out[:, 1] = legs.height_rate
@@ -233,7 +241,11 @@ class HoppingTask:
         out[:, 4:6] = legs.qd * gain[2:4]
         out[:, 6] = (self.command - offset[4]) * gain[4]
         gaps = legs.foot_clearance(), legs.knee_clearance(), legs.base_clearance()
-        out[:, 7:_PRIVILEGED] = np.stack(gaps, axis=1) * _CLEARANCE_GAIN
+        out[:, 7:10] = np.stack(gaps, axis=1) * _CLEARANCE_GAIN
+        out[:, 10] = np.clip(excess / _EXCESS, -3, 3)
+        out[:, 11] = np.exp(-np.abs(excess) / _NEAR)
+        out[:, 12] = np.sign(legs.height_rate)
+        out[:, 13:15], out[:, 15] = self.last_action, self._since_apex
         out[:, _PRIVILEGED:] = self._numbers
         return out
 
@@ -248,6 +260,7 @@ class HoppingTask:
             "switch": self._switch.copy(),
             "last_action": self.last_action.copy(),
             "rises": self._rises.copy(),
+            "since_apex": self._since_apex.copy(),
             "rng": self._rng.bit_generator.state,
             "legs_seed": self._legs_seed,
             "recent_errors": list(self._recent_errors),
@@ -266,6 +279,7 @@ class HoppingTask:
         self._end[:] = state["end"]
         self._switch[:] = state["switch"]
         self.last_action, self._rises = np.array(state["last_action"]), np.array(state["rises"])
+        self._since_apex = np.array(state["since_apex"])
         self._recent_errors = deque(state["recent_errors"], maxlen=_RECENT)
         self._rng.bit_generator.state = state["rng"]
         self.reward.restore(state["reward"])
@@ -320,7 +334,7 @@ class HoppingTask:
         height, q = self._initial_states.draw(rows, self.command[rows], self._rng)
         self.legs.place(rows, height, q)
         self._end[rows] = self._tick + self._horizon
-        self.last_action[rows], self._rises[rows] = 0.0, False
+        self.last_action[rows], self._rises[rows], self._since_apex[rows] = 0.0, False, 0.0
         self.reward.restart(rows)
         self._switch[rows] = np.iinfo(np.int64).max
         if self.options.command_resampling_time is not None and command is None:

@@ -34,8 +34,8 @@ _SECONDS, _STEP = 3.5, 5e-4
 _REACHED_DRAWN = 0.006
 """The same on a drawn leg of the paper's size, m."""
 
-_AT_ONCE, _ROUND = 8, 64
-"""Legs in one task of a worker, and in all tasks until what they found is kept."""
+_AT_ONCE = 8
+"""Legs in one task of a worker; what it found is kept at its end."""
 
 _BETWEEN_SEEDS = 1_000_000
 """Legs of which no two trainings draw the same."""
@@ -136,9 +136,13 @@ def find_legs(
         on_progress: Told the share that is done, 0 to 1.
 
     Raises:
-        UsageError: The file is damaged.
+        UsageError: The file is damaged, or there is nothing to do for a cluster.
     """
     if recipe.legs == "robot":
+        if ray is not None:
+            raise UsageError(
+                f"--ray tries drawn legs, of which the recipe {recipe.name} has none; leave it out."
+            )
         return []
     assert isinstance(recipe.algorithm, DaggerConfig), "a teacher says what legs reach"
     count, heights = recipe.schedule.num_envs, recipe.task.command_bounds
@@ -151,14 +155,14 @@ def find_legs(
             found = [io.read_dataclass(Reach, row, str(file)) for row in stored["legs"]]
             tried = stored["tried"]
     compile_physics()
+    first = seed * _BETWEEN_SEEDS + tried
+    parts = (range(first + k, first + k + _AT_ONCE) for k in itertools.count(0, _AT_ONCE))
     with ProcessWorkers(processes) as local:
         workers = local if ray is None else RayWorkers(ray)
+        reached = workers.map(_find_some, ((legs, heights, *teacher) for legs in parts))
         while len(found) < count:
-            first = seed * _BETWEEN_SEEDS + tried
-            parts = [range(first + k, first + k + _AT_ONCE) for k in range(0, _ROUND, _AT_ONCE)]
-            for reaches in workers.map(_find_some, [(legs, heights, *teacher) for legs in parts]):
-                found += reaches
-            tried += _ROUND
+            found += next(reached)
+            tried += _AT_ONCE
             rows = [asdict(reach) for reach in found]
             io.write_json(file, {"asked": asked, "tried": tried, "legs": rows})
             on_progress(min(len(found) / count, 1.0))

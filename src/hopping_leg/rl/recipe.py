@@ -10,6 +10,7 @@ import numpy as np
 from hopping_leg import envs, io
 from hopping_leg.rl.distillation.dagger import Dagger, DaggerConfig
 from hopping_leg.rl.distillation.students import StudentConfig
+from hopping_leg.rl.ppo import PPO, PPOConfig
 from hopping_leg.rl.resumable import ResumableSAC
 from hopping_leg.rl.sac import NetworkConfig, SACConfig
 from hopping_leg.robot import DEFAULT_ROBOT, Robot
@@ -58,7 +59,7 @@ class Recipe:
     """As in policy files."""
     task: envs.TaskConfig
     """The learning problem."""
-    algorithm: SACConfig | DaggerConfig
+    algorithm: PPOConfig | SACConfig | DaggerConfig
     """What learns, with its hyper-parameters."""
     network: NetworkConfig | StudentConfig
     """Sizes of its networks: of actor and critic, or of the student."""
@@ -97,7 +98,7 @@ class Recipe:
 
     def make_learner(
         self, robot: Robot, seed: int, threads: int = 1, legs: Sequence[envs.TaskLeg] = ()
-    ) -> Dagger | ResumableSAC:
+    ) -> Dagger | PPO | ResumableSAC:
         """Build the algorithm on its environments, of ``legs`` where these differ, untrained."""
         rng, count, options = np.random.default_rng(seed), self.schedule.num_envs, self.task
         if isinstance(self.algorithm, DaggerConfig):
@@ -110,7 +111,7 @@ class Recipe:
         if isinstance(self.algorithm, DaggerConfig):
             assert isinstance(self.network, StudentConfig), "a distillation has a student"
             return Dagger(task, self.algorithm, self.network, seed)
-        assert isinstance(self.network, NetworkConfig), "SAC has actor and critics"
+        assert isinstance(self.network, NetworkConfig), "reinforcement learning has a critic"
         return self.algorithm.make_learner(task, self.network, seed)
 
     def make_reward(self, robot: Robot) -> envs.Reward:

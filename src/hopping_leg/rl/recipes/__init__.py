@@ -11,11 +11,11 @@ from hopping_leg.controllers.user_controllers import load_user_object
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.rl.distillation.students import StudentConfig
 from hopping_leg.rl.recipe import Recipe
-from hopping_leg.rl.recipes import fast, paper, precise, universal
+from hopping_leg.rl.recipes import fast, paper, rl, universal
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, Range
 
 RECIPES: Mapping[str, Recipe] = {
-    recipe.name: recipe for recipe in (fast.FAST, paper.PAPER, precise.PRECISE, universal.UNIVERSAL)
+    recipe.name: recipe for recipe in (rl.RL, fast.FAST, paper.PAPER, universal.UNIVERSAL)
 }
 """Every recipe that ``hop train`` knows."""
 

@@ -1,0 +1,265 @@
+"""Proximal policy optimisation (Schulman et al. 2017) on many legs.
+
+The actor sees what the robot measures; the critic, which is thrown away afterwards, sees the true
+state. The noise of exploration is the same for all states and falls to a schedule; the learning
+rate follows how far a policy moves. Rollouts of a policy that is one update older, gathered beside
+the gradient steps, made it forget how to hop as the noise fell.
+"""
+
+import copy
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.torch_layers import create_mlp
+from torch import nn
+
+from hopping_leg.envs.task import HoppingTask
+from hopping_leg.rl.checkpoint import Tree, to_torch
+from hopping_leg.rl.onnx_export import Actor, DenseActor
+from hopping_leg.rl.sac import NetworkConfig
+
+_LEAST_RATE, _MOST_RATE = 1e-5, 3e-3
+"""Between which the learning rate adapts."""
+_AVERAGED = 0.97
+"""Share that an update leaves of the mean of the actors so far, which is the policy."""
+_OUTSIDE = 0.1
+"""Weight of the square by which mean actions leave [-1, 1]."""
+
+
+@dataclass(frozen=True)
+class PPOConfig:
+    """Numbers of proximal policy optimisation, with the names of stable-baselines3."""
+
+    learning_rate: float = 1e-3
+    """Learning rate of Adam at the start, before it adapts; falls to a tenth besides."""
+    n_steps: int = 32
+    """Control steps of a rollout, each environment."""
+    n_epochs: int = 3
+    """How often each is learnt from."""
+    batch_size: int = 8192
+    """Control steps per gradient step."""
+    gamma: float = 0.99
+    """Discount factor per control step: a horizon of half a second, about one hop."""
+    gae_lambda: float = 0.95
+    """Of generalised advantage estimation."""
+    clip_range: float = 0.2
+    """How far the ratio of probabilities counts on either side of 1."""
+    target_kl: float = 0.015
+    """Divergence of the policies before and after an update to which the learning rate adapts."""
+    log_std: tuple[float, float] = (-0.7, -3.0)
+    """Log standard deviation of the actions' noise at the start and at the end."""
+    log_std_until: float = 0.7
+    """Share of the training with which it has fallen."""
+
+    def make_learner(self, task: HoppingTask, network: NetworkConfig, seed: int) -> "PPO":
+        """Build PPO on the task."""
+        return PPO(task, self, network, seed)
+
+
+class Rollout(NamedTuple):
+    """Some control periods of n environments, in torch."""
+
+    observations: torch.Tensor
+    """What the actor saw, (ticks, n, size)."""
+    states: torch.Tensor
+    """What the critic sees, before every tick and after the last, (ticks + 1, n, k)."""
+    actions: torch.Tensor
+    """(ticks, n, 2)."""
+    noise: torch.Tensor
+    """Of the actions, standard normal, (ticks, n, 2)."""
+    rewards: torch.Tensor
+    """(ticks, n)."""
+    ended: torch.Tensor
+    """1 where an episode ended with the tick, (ticks, n)."""
+    final: torch.Tensor
+    """What the critic sees of the ends, (e, k)."""
+    truncated: torch.Tensor
+    """1 where the end's time was up and 0 where the leg fell, (e,)."""
+    std: torch.Tensor
+    """Standard deviation of the actions, a number."""
+
+
+class PPO:
+    """A training from nothing; ``Dagger`` has the same attributes.
+
+    Everything random follows from the seed, on any number of cores.
+    """
+
+    on_boundary: Callable[[], None] | None = None
+    remaining: Callable[[], float] | None = None
+
+    def __init__(
+        self, task: HoppingTask, config: PPOConfig, network: NetworkConfig, seed: int
+    ) -> None:
+        torch.manual_seed(seed)
+        self.task, self.config = task, config
+        self.actor = _mlp(task.observation.size, network.actor, 2)
+        self._seen = task.reset()
+        self.critic = _mlp(task.privileged_size, network.critic, 1)
+        head = list(self.actor.parameters())[-2:]
+        with torch.no_grad():
+            head[0].mul_(0.01)
+            head[1].zero_()
+        self._parameters = [*self.actor.parameters(), *self.critic.parameters()]
+        self.optimizer = torch.optim.Adam(self._parameters, lr=config.learning_rate, eps=1e-5)
+        self._rate = config.learning_rate
+        self._draws = torch.Generator().manual_seed(seed)
+        self._average = copy.deepcopy(self.actor)
+        self.logger = Logger(None, [])
+        self.num_timesteps, self._left = 0, 1.0
+        self.seconds = {"rollouts": 0.0, "gradient steps": 0.0}
+        """Time spent on each."""
+
+    def set_logger(self, logger: Logger) -> None:
+        """Set where the curves go."""
+        self.logger = logger
+
+    @property
+    def share(self) -> float:
+        """Share of the training that is done, 0 to 1."""
+        return 1 - self._left
+
+    def train_until(self, steps: int, callback: Callable[[], bool], log_interval: int) -> None:
+        """Learn until so many control steps are done in all, or until the callback says no."""
+        rollouts = 0
+        while self.num_timesteps < steps and callback():
+            self._left = 1 - self.num_timesteps / steps
+            if self.remaining is not None:
+                self._left = min(self._left, self.remaining())
+            if self.on_boundary is not None:
+                self.on_boundary()
+            self.task.reward.anneal(self.share)
+            rollout = self._collect()
+            self._train(rollout)
+            self.num_timesteps += self.config.n_steps * self.task.count
+            rollouts += 1
+            if rollouts % log_interval == 0:
+                self.logger.record("rollout/apex_error_m", self.task.mean_apex_error)
+                self.logger.record("rollout/reward", float(rollout.rewards.mean()))
+                self.logger.dump(self.num_timesteps)
+
+    def _collect(self) -> Rollout:
+        began = time.monotonic()
+        with torch.no_grad():
+            rollout = self._act()
+        self.seconds["rollouts"] += time.monotonic() - began
+        return rollout
+
+    def _act(self) -> Rollout:
+        task, config = self.task, self.config
+        first, last = config.log_std
+        std = math.exp(first + (last - first) * min(1.0, self.share / config.log_std_until))
+        noise = torch.randn((config.n_steps, task.count, 2), generator=self._draws)
+        ticks, states, finals, truncated = [], [task.privileged()], [], []
+        for tick in range(config.n_steps):
+            seen = torch.from_numpy(self._seen)
+            action = self.actor(seen) + std * noise[tick]
+            step = task.step(action.numpy())
+            ended = step.terminated | step.truncated
+            if step.final_privileged is not None:
+                rows = np.flatnonzero(ended)
+                finals.append(step.final_privileged[rows])
+                truncated.append(step.truncated[rows].astype(np.float32))
+            self._seen = step.observation
+            states.append(task.privileged())
+            reward = torch.from_numpy(step.reward.astype(np.float32))
+            ticks.append((seen, action, reward, torch.from_numpy(ended.astype(np.float32))))
+        observations, actions, rewards, ends = map(torch.stack, zip(*ticks, strict=True))
+        none = [np.empty((0, states[0].shape[1]), np.float32)]
+        return Rollout(
+            observations, torch.from_numpy(np.stack(states)), actions, noise, rewards, ends,
+            torch.from_numpy(np.concatenate(finals or none)),
+            torch.from_numpy(np.concatenate(truncated or [np.empty(0, np.float32)])),
+            torch.tensor(std),
+        )  # fmt: skip
+
+    def _train(self, rollout: Rollout) -> None:
+        began, config = time.monotonic(), self.config
+        states = rollout.states[:-1].flatten(0, 1)
+        observations, actions = rollout.observations.flatten(0, 1), rollout.actions.flatten(0, 1)
+        before = -0.5 * rollout.noise.square().sum(dim=-1).flatten()
+        advantages, returns = (values.flatten() for values in self._advantages(rollout))
+        advantages = (advantages - advantages.mean()) / (advantages.std() + 1e-8)
+        for group in self.optimizer.param_groups:
+            group["lr"] = self._rate * max(0.1, self._left)
+        moved = []
+        for rows in self._draw_batches(len(actions)):
+            mean = self.actor(observations[rows])
+            now = -0.5 * ((actions[rows] - mean) / rollout.std).square().sum(dim=-1)
+            ratio = torch.exp(now - before[rows])
+            clipped = ratio.clamp(1 - config.clip_range, 1 + config.clip_range)
+            gain = torch.minimum(ratio * advantages[rows], clipped * advantages[rows]).mean()
+            missed = (self.critic(states[rows])[:, 0] - returns[rows]).square().mean()
+            outside = (mean.abs() - 1).clamp(min=0).square().mean()
+            self.optimizer.zero_grad()
+            (missed + _OUTSIDE * outside - gain).backward()
+            nn.utils.clip_grad_norm_(self._parameters, 1.0)
+            self.optimizer.step()
+            moved.append(float((ratio.detach() - 1 - torch.log(ratio.detach())).mean()))
+        with torch.no_grad():
+            for mean, now in zip(self._average.parameters(), self.actor.parameters(), strict=True):
+                mean.lerp_(now, 1 - _AVERAGED)
+        divergence = float(np.mean(moved[-len(moved) // config.n_epochs :]))
+        if divergence > 2 * config.target_kl:
+            self._rate = max(self._rate / 1.5, _LEAST_RATE)
+        elif divergence < config.target_kl / 2:
+            self._rate = min(self._rate * 1.5, _MOST_RATE)
+        self.logger.record("train/approx_kl", divergence)
+        self.logger.record("train/learning_rate", self._rate)
+        self.seconds["gradient steps"] += time.monotonic() - began
+
+    def _draw_batches(self, size: int) -> Iterator[torch.Tensor]:
+        for _ in range(self.config.n_epochs):
+            order, batch = torch.randperm(size, generator=self._draws), self.config.batch_size
+            yield from (order[first : first + batch] for first in range(0, size, batch))
+
+    @torch.no_grad()
+    def _advantages(self, rollout: Rollout) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return generalised advantages and what the critic should have said, (ticks, n)."""
+        config, alive = self.config, 1 - rollout.ended
+        values = self.critic(rollout.states)[..., 0]
+        after = values[1:] * alive
+        after[rollout.ended > 0] = self.critic(rollout.final)[:, 0] * rollout.truncated
+        errors = rollout.rewards + config.gamma * after - values[:-1]
+        advantages, ahead = torch.empty_like(errors), torch.zeros_like(errors[0])
+        for tick in reversed(range(len(errors))):
+            ahead = errors[tick] + config.gamma * config.gae_lambda * alive[tick] * ahead
+            advantages[tick] = ahead
+        return advantages, advantages + values[:-1]
+
+    def network(self) -> Actor:
+        """Return the deterministic actor as it stands."""
+        return DenseActor(*self._average)
+
+    def state(self) -> Tree:
+        """Return everything needed to continue exactly, environments included."""
+        return {
+            "actor": self.actor.state_dict(),
+            "average": self._average.state_dict(),
+            "critic": self.critic.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
+            "rate": self._rate,
+            "task": self.task.state(),
+            "draws": self._draws.get_state().numpy(),
+            "steps": self.num_timesteps,
+        }
+
+    def restore(self, state: Tree) -> None:
+        """Go on from a ``state``."""
+        self.actor.load_state_dict(to_torch(state["actor"]))
+        self._average.load_state_dict(to_torch(state["average"]))
+        self.critic.load_state_dict(to_torch(state["critic"]))
+        self.optimizer.load_state_dict(to_torch(state["optimizer"]))
+        self._rate, self.num_timesteps = state["rate"], state["steps"]
+        self._seen = self.task.restore(state["task"])
+        self._draws.set_state(torch.from_numpy(state["draws"]))
+
+
+def _mlp(inputs: int, hidden: tuple[int, ...], outputs: int) -> nn.Sequential:
+    return nn.Sequential(*create_mlp(inputs, outputs, list(hidden), nn.ELU))
