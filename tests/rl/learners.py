@@ -5,7 +5,7 @@ from stable_baselines3.common.logger import configure
 
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.envs import TaskLeg
-from hopping_leg.rl import policy_evaluation, reach
+from hopping_leg.rl import policy_evaluation
 from hopping_leg.rl.onnx_export import build_policy
 from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.rl.recipes.paper import PAPER
@@ -80,4 +80,3 @@ def try_briefly(monkeypatch):
     """Let trials of policies take half a second."""
     monkeypatch.setitem(policy_evaluation.evaluate_policy.__kwdefaults__, "seconds", 0.5)
     monkeypatch.setattr(policy_evaluation, "_RANGE_SECONDS", 0.5)
-    monkeypatch.setattr(reach, "_ROUND", 8)
