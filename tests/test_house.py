@@ -23,7 +23,7 @@ CEILINGS = {
     "src/**/*.py": (176, 26635),
     "tests/**/*.py": (137, 14040),
     "studies/**/*.py": (74, 7920),
-    "docs/**/*.md": (22, 2530),
+    "docs/**/*.md": (22, 2520),
     "docs/live/*.js": (13, 1490),
 }
 """Files and lines at most. Who raises one says what users gain by it."""
