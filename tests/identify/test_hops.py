@@ -1,4 +1,4 @@
-"""Hops on a boom: found from the base's course alone, and good for a fit."""
+"""Hops on boom and rail: found from the base's course or from the joints, and good for a fit."""
 
 from dataclasses import replace
 
@@ -20,14 +20,15 @@ from tests.identify.runs import RECORDINGS, needs_recordings
 CAD = load_robot("legv2")
 BOOM = Boom(1.146, 0.3, 0.378, masses=((1.3, -0.7, 0.3), (0.9, 0.45, 0.0)))
 TRUE = replace(CAD, knee=replace(CAD.knee, friction=0.2), boom=replace(BOOM, weight=0.8))
+ON_RAIL = replace(TRUE, boom=Boom())
 REST, AIR = np.array([1.5, -2.2]), np.array([0.9, -1.9])
 
 
 def hopping(robot=TRUE, count=4):
-    """Return a recording of hops that begin at rest, and the rows at which the foot takes off."""
+    """Return a recording of hops that begin at rest, and the rows of lift-offs and touchdowns."""
     legs = LegSimulator(robot, 1, timestep=2.5e-4)
     legs.stand(slice(None), REST)
-    rows, lifted, pushing, length = [], [], False, 0.0
+    rows, changes, pushing, length = [], ([], []), False, 0.0
     for tick in range(200 * count):
         phase = tick % 200
         q, qd, touching = legs.q[0], legs.qd[0], legs.foot_clearance()[0] <= 0
@@ -39,11 +40,17 @@ def hopping(robot=TRUE, count=4):
             torque = kinematics.jacobian(robot, q).T @ [60.0 + 5 * (tick // 200), 0.0]
         rows.append([tick / 200, *q, *qd, *legs.measured_torque[0], *torque, legs.height[0]])
         legs.step(np.array([torque]))
-        if touching and phase > 40 and legs.foot_clearance()[0] > 0:
-            lifted.append(tick + 1)
+        if tick > 40 and (legs.foot_clearance()[0] > 0) == touching:
+            changes[not touching].append(tick + 1)
     names = ["time_s", *MEASURED, *PAIRS["torque_command"], "height_m"]
-    metadata = RecordingMetadata("boom", 200.0, "legv2", "simulated", boom=BOOM)
-    return make_recording(pl.DataFrame(np.array(rows), names), metadata, "hops"), lifted
+    rig, boom = ("boom", BOOM) if robot.boom.radius else ("rail", Boom())
+    metadata = RecordingMetadata(rig, 200.0, "legv2", "simulated", boom=boom)
+    return make_recording(pl.DataFrame(np.array(rows), names), metadata, "hops"), changes
+
+
+def unmeasured(recording):
+    """Return a recording whose base nobody measured."""
+    return recording.with_table(recording.trace.table.drop("height_m"))
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +59,7 @@ def recorded():
 
 
 def test_flights_begin_when_the_foot_takes_off(recorded):
-    recording, lifted = recorded
+    recording, (lifted, _) = recorded
     found = hops.flights(recording, CAD)
     assert len(found) == 4
     for flight in found:
@@ -90,12 +97,43 @@ def test_hops_tell_friction_and_weight(recorded, tmp_path):
     assert weight == pytest.approx(0.8, abs=0.3)  # of 18 N: the ground has not yet given at a start
 
 
+@pytest.mark.parametrize("robot", [TRUE, ON_RAIL], ids=["boom", "rail"])
+def test_joints_tell_flights_and_how_high_they_go(robot):
+    recording, (lifted, landed) = hopping(robot, 2)
+    told = hops.with_height(unmeasured(recording), CAD)
+    rise, true = hops.base_height(told), recording.trace.column("height_m")
+    known = np.flatnonzero(~np.isnan(rise))
+    up, down = lifted[0], landed[0]
+    assert known[known > 45].min() == pytest.approx(up, abs=2)
+    assert known[known < down + 20].max() == pytest.approx(down, abs=2)
+    assert np.nanmax(rise[up:down]) == pytest.approx(true[up:down].max(), abs=0.035)
+    flight = hops.flights(told, CAD)[0]
+    assert flight.rest == 40
+    assert flight.start == pytest.approx(up, abs=2)
+
+
+def test_hops_on_a_rail_tell_friction_without_a_height():
+    run, other = (unmeasured(hopping(ON_RAIL, count)[0]) for count in (4, 3))
+    options = IdentifyOptions(parameters=("knee.friction", "contact.time_constant"))
+    found = identify([run], CAD, validate=[other], options=options)
+    assert found.identifiability.values == pytest.approx([0.2, 0.02], rel=0.1)
+    (hip, knee), *_ = found.validation.open_loop_position_rms_rad.values()
+    assert max(hip, knee) < 0.003
+
+
+def test_without_a_hop_a_recording_stays_as_it_was():
+    recording, _ = hopping(ON_RAIL, 1)
+    standing = unmeasured(recording).part(0, 40)
+    assert hops.with_height(standing, CAD).trace.table.equals(standing.trace.table)
+    assert hops.with_height(recording, CAD) is recording
+    assert not hops.by_hops(standing)
+
+
 def test_a_boom_without_a_height_or_hops_is_refused(recorded):
     recording = recorded[0]
-    with pytest.raises(RecordingError, match="where its base was"):
-        identify([recording.with_table(recording.trace.table.drop("height_m"))], CAD)
-    with pytest.raises(RecordingError, match="No flight of the base"):
-        identify([recording.part(0, 40)], CAD, validate=[recording])
+    for run in (recording, unmeasured(recording)):
+        with pytest.raises(RecordingError, match="No flight"):
+            identify([run.part(0, 40)], CAD, validate=[recording])
 
 
 def test_a_boom_is_kept_in_a_file_and_an_older_field_passed_over(recorded, tmp_path):
@@ -126,3 +164,16 @@ def test_the_labs_folder_is_read_as_it_is():
     standing = kinematics.stance_height(CAD, recording.array("position")[rests])
     assert np.median(np.abs(recording.trace.column("height_m")[rests] - standing)) < 2e-3
     assert np.abs(recording.array("torque_command")[:, 1]).max() > 12.0
+
+
+@needs_recordings
+@pytest.mark.parametrize("run", ["static", "dynamic_1"])
+def test_joints_tell_the_flights_that_the_boom_measured(run):
+    recording = load_recording(RECORDINGS / "legv2_boom_200hz" / run)
+    true = hops.flights(recording, CAD)
+    found = hops.flights(hops.with_height(unmeasured(recording), CAD), CAD)
+    assert len(found) == len(true)
+    rows = np.array([[(f.start, f.stop) for f in some] for some in (found, true)])
+    off = np.diff(recording.time[rows], axis=0)[0]
+    assert np.abs(off).max() <= 0.06
+    assert np.abs(np.median(off, axis=0)).max() <= 0.03

@@ -8,7 +8,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
 from hopping_leg.errors import RecordingError
-from hopping_leg.identify.hops import base_height
+from hopping_leg.identify.hops import base_height, by_hops
 from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.simulate import Window, WindowSimulator
@@ -180,13 +180,11 @@ def measured(simulator: WindowSimulator, quantity: str) -> Array:
         if of_joints:
             sampled = recording.array(quantity)[rows]
             sampled[(w.joints or w.length) - w.unscored :] = np.nan
-        elif recording.metadata.rig == "boom":
-            height = base_height(recording)
-            sampled = height[rows] - height[w.start]
-        elif recording.metadata.rig == "rail" and recording.has_column("height_m"):
-            sampled = recording.trace.column("height_m")[rows].copy()
-        else:
+        elif recording.metadata.rig == "fixed-base":
             continue
+        else:
+            height = base_height(recording)
+            sampled = height[rows] - (height[w.start] if by_hops(recording) else 0.0)
         sampled[~recording.exact_time[rows]] = np.nan
         values[i, w.unscored : w.length] = sampled
     return values

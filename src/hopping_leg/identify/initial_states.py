@@ -44,13 +44,6 @@ def start_states(recording: Recording) -> tuple[Array, Array]:
     return position, velocity
 
 
-def base_state(recording: Recording, robot: Robot) -> tuple[Array, Array]:
-    """Return height, m, and speed, m/s, of the base at every row, (rows,); NaN and 0 if unknown."""
-    if not recording.has_column("height_m"):
-        return np.full(len(recording), np.nan), np.zeros(len(recording))
-    return recording.trace.column("height_m"), base_rate(recording, robot)
-
-
 def base_rate(recording: Recording, robot: Robot) -> Array:
     """Return the speed of the base at every row, m/s, (rows,), from its measured height.
 

@@ -7,7 +7,7 @@ import numpy as np
 import polars as pl
 
 from hopping_leg.errors import PhysicsError, RecordingError, RobotError, UsageError
-from hopping_leg.identify import validation
+from hopping_leg.identify import hops, validation
 from hopping_leg.identify.cost import Objective
 from hopping_leg.identify.identifiability import Identifiability, identifiability
 from hopping_leg.identify.optimizers import Pass, Report, SearchOptions, jacobian, search
@@ -65,6 +65,8 @@ def identify(
     options = options or IdentifyOptions()
     if seed < 0 or options.threads < 0:
         raise UsageError("The seed and the number of threads must not be negative.")
+    recordings = [hops.with_height(recording, robot) for recording in recordings]
+    validate = [hops.with_height(recording, robot) for recording in validate]
     check_recordings([*recordings, *validate], robot)
     names, bounds, how = options.parameters, options.bounds, options.search
     plan = make_plan(recordings, robot, parameters=names, bounds=bounds, search=how)
@@ -73,7 +75,7 @@ def identify(
         _check_conventions(recording, plan.start)
     windows = cut(fit, plan.window, unscored=plan.unscored)
     if not windows:
-        raise RecordingError("No flight of the base was found; record hops that begin at rest.")
+        raise RecordingError("No flight was found; record hops that begin at rest, with torques.")
     scoring, threads = plan.scoring, options.threads
     objective = Objective(tuple(fit), tuple(windows), plan.parameters, scoring, threads)
     passes = search(plan, objective, options.effort, seed=seed, report=report, ray=options.ray)

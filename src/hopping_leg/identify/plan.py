@@ -36,10 +36,6 @@ def check_recordings(recordings: Sequence[Recording], robot: Robot) -> None:
                 f"{recording.name} has no positions of the {JOINTS[int(np.argmax(lacking))]};"
                 " record both joints, as one moves the other."
             )
-        if recording.metadata.rig == "boom" and np.isnan(hops.base_height(recording)).all():
-            raise RecordingError(
-                f"{recording.name} does not say where its base was; record height_m or base_rise_m."
-            )
         wanted, what = "position_command", "targets of its on-board PD"
         if recording.metadata.onboard == "torque":
             wanted, what = "torque_command", "commanded torques"
@@ -158,7 +154,8 @@ def _names(recordings: Sequence[Recording], gains: list[str]) -> list[str]:
     names = [n for n in first + second if n not in (*_INERTIAS, "hip.armature")]
     names += ["thigh.com", "shank.com", *_INERTIAS, "drive.delay"]
     if {r.metadata.rig for r in recordings} == {"boom"}:  # hops hardly tell where masses are
-        return [n for n in names if n.split(".")[-1] not in ("com", "inertia")] + _BOOM_PARAMETERS
+        hidden = ("com", "inertia", "weight" if hops.timed(recordings) else "")
+        return [n for n in [*names, *_BOOM_PARAMETERS] if n.split(".")[-1] not in hidden]
     # What motors gave is known where it was commanded, or measured beside what was asked for.
     commanded = [r.metadata.onboard == "torque" for r in recordings]
     measured = [r.metadata.onboard == "zoh" and r.has("torque") for r in recordings]
@@ -243,8 +240,9 @@ def _start(recordings: Sequence[Recording], gains: list[str]) -> dict[str, float
 
 
 def _scoring(recordings: Sequence[Recording], gains: list[str]) -> cost.Scoring:
-    if any(r.metadata.rig == "boom" for r in recordings):
-        return cost.Scoring(position=0.03, height=0.006, torque=0.5, robust=3.0, unexplained=4.0)
+    if any(map(hops.by_hops, recordings)):
+        rise = 0.02 if hops.timed(recordings) else 0.006
+        return cost.Scoring(position=0.03, height=rise, torque=0.5, robust=3.0, unexplained=4.0)
     if all(r.metadata.onboard == "torque" for r in recordings):
         return cost.Scoring(position=0.02, robust=2.0, unexplained=0.4)
     torque = 0.2 if any(r.has("torque") for r in recordings) else None

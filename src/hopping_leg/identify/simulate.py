@@ -50,7 +50,7 @@ def cut(
 ) -> list[Window]:
     """Cut recordings into windows of one duration, s, whose first ``unscored`` s do not count.
 
-    A recording on a boom is cut as ``hops`` says, whatever the duration. Without a duration each
+    Recordings of hops are cut as ``hops`` says, whatever the duration. Without a duration each
     recording is one window, as in the paper. The stride, s, is from one window's start to the next;
     without it there is no gap and no overlap.
     """
@@ -59,10 +59,9 @@ def cut(
         rate = recording.metadata.rate_hz
         skip = max(1, round(unscored * rate))
         before = len(windows)
-        if recording.metadata.rig == "boom":
-            robot = load_robot(recording.metadata.robot)
-            for first, length, joints in hops.hop_windows(recording, robot):
-                windows.append(Window(index, first, length, joints=joints))
+        if hops.by_hops(recording):
+            found = hops.hop_windows(recording, load_robot(recording.metadata.robot))
+            windows += [Window(index, first, length, joints=n) for first, length, n in found]
             continue
         for segment in recording.segments():
             rows = segment.stop - segment.start
@@ -152,7 +151,7 @@ class _WindowGroup:
         result[..., 4:6] *= _drive_values(hypotheses, "sensor_gain")[:, None, None]
         if not self._moving:
             result[..., 6] = np.nan
-        elif self._metadata.rig == "boom":  # where its ground is nobody measured
+        elif hops.by_hops(self._recordings[0]):  # where its ground is nobody measured
             result[..., 6] -= result[:, :, :1, 6]
         return result
 
@@ -229,10 +228,9 @@ class _WindowGroup:
         """Return the base's first height, m, NaN where it stands, and speed in windows, m/s."""
         lengths = (robot.thigh.length, robot.shank.length, robot.foot.radius)
         if lengths not in self._bases:
-            find = initial_states.base_state if self._metadata.rig == "rail" else hops.start_heights
-            heights, rates = zip(*(find(r, robot) for r in self._recordings), strict=True)
-            rows = self._spans["start"]
-            self._bases[lengths] = np.concatenate(heights)[rows], np.concatenate(rates)[rows]
+            found = [hops.start_heights(recording, robot) for recording in self._recordings]
+            heights, rates = np.concatenate(found, axis=1)[:, self._spans["start"]]
+            self._bases[lengths] = heights, rates
         return self._bases[lengths]
 
 
@@ -288,8 +286,9 @@ class WindowSimulator:
         self.rows = max(w.length for w in windows)
         kinds: dict[tuple[object, ...], list[int]] = {}
         for index, window in enumerate(windows):
-            metadata = recordings[window.recording].metadata
-            kind = (metadata.rig, metadata.onboard, metadata.boom, metadata.zeroed)
+            recording = recordings[window.recording]
+            metadata, alike = recording.metadata, hops.by_hops(recording)
+            kind = (metadata.rig, metadata.onboard, metadata.boom, metadata.zeroed, alike)
             kinds.setdefault(kind, []).append(index)
         self._groups = [
             (ids, _WindowGroup(recordings, [windows[i] for i in ids], timestep, threads))

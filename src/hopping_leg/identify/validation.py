@@ -8,6 +8,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.identify import initial_states, parameters
 from hopping_leg.identify.cost import measured
+from hopping_leg.identify.hops import by_hops
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import PAIRS, Pair
 from hopping_leg.identify.simulate import Window, WindowSimulator, cut
@@ -57,7 +58,7 @@ def open_loop(
     driven = [
         d
         for d in map(as_torque_driven, recordings)
-        if (d.metadata.rig != "boom" or horizon == HORIZONS[0])  # whose hops have one length
+        if (not by_hops(d) or horizon == HORIZONS[0])  # whose hops have one length
         and max(s.stop - s.start for s in d.segments()) >= max(3, horizon * d.metadata.rate_hz)
         and d.has("torque_command")
     ]
