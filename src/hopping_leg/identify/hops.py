@@ -172,9 +172,9 @@ def start_heights(recording: Recording, robot: Robot) -> tuple[Array, Array]:
 
     Where none was measured, the leg stands: its height is left open, NaN, and its rate zero.
     """
-    measured, (velocity, _) = base_height(recording), base_course(recording, robot)
     if not by_hops(recording) and recording.has_column("height_m"):
-        return measured, base_rate(recording, robot)
+        return base_height(recording), base_rate(recording, robot)
+    measured, (velocity, _) = base_height(recording), base_course(recording, robot)
     height, rate = np.full(len(recording), np.nan), np.zeros(len(recording))
     standing = kinematics.stance_height(robot, recording.array("position"))
     back = round(_SHORTEST * recording.metadata.rate_hz)
