@@ -95,8 +95,7 @@ def test_an_unknown_gain_gets_a_sentence():
 
 
 def test_a_candidate_that_breaks_down_spoils_no_other():
-    run = record(LEG, swing(0.5), onboard="torque")
-    run = run.with_metadata(torque_limit=(1e12, 1e12))
+    run = record(LEG, swing(0.5), onboard="torque").with_metadata(torque_limit=(1e12, 1e12))
     wild = TRUE.replace({"hip.torque_gain": 1e9, "hip.motor.peak_torque": 1e12})
     got = simulator([run]).run([wild, TRUE]).position
     assert np.isnan(got[0]).all()
@@ -125,16 +124,13 @@ LONG = record(LEG, swing(60.0))
 @pytest.mark.parametrize("seed", range(4))
 def test_every_fourth_stretch_is_held_out_and_nothing_is_lost(seed):
     fit, held = hold_out([LONG], 2.0, np.random.default_rng(seed))
-    times = np.sort(np.concatenate([r.time for r in (*fit, *held)]))
-    np.testing.assert_array_equal(times, LONG.time)
+    assert sorted(np.concatenate([r.time for r in (*fit, *held)])) == LONG.time.tolist()
     assert sum(map(len, held)) == pytest.approx(0.25 * len(LONG), abs=4)
-    gaps = np.diff([r.time[0] for r in held])
-    np.testing.assert_allclose(gaps, 20.0, atol=0.02)
+    np.testing.assert_allclose(np.diff([r.time[0] for r in held]), 20.0, atol=0.02)
 
 
 def test_a_short_recording_gives_its_last_quarter():
-    run = record(LEG, swing(8.0))
-    (fit,), (held,) = hold_out([run], 4.0, np.random.default_rng(0))
+    (fit,), (held,) = hold_out([record(LEG, swing(8.0))], 4.0, np.random.default_rng(0))
     assert len(fit) == 3 * len(held)
     assert fit.time[-1] < held.time[0]
     with pytest.raises(RecordingError, match=r"5 s, but 5\.34 s are needed.*--validate"):
@@ -145,8 +141,7 @@ WRONG = TRUE.replace({"hip.friction": 0.4})
 
 
 def judge(hypothesis, onboard="zoh"):
-    run = record(LEG, swing(2.0), onboard=onboard)
-    return validate([run], hypothesis)
+    return validate([record(LEG, swing(2.0), onboard=onboard)], hypothesis)
 
 
 @pytest.mark.parametrize("onboard", ["zoh", "torque"])
