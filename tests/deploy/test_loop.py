@@ -271,7 +271,8 @@ def test_what_is_not_permitted_is_a_notice(monkeypatch):
         raise PermissionError
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
-    assert "SCHED_FIFO" in realtime.prefer_this_process()
+    for prefer in (realtime.prefer_this_thread, realtime.prefer_this_process):
+        assert "SCHED_FIFO" in prefer()
     with realtime.keeping_time() as notices:
         assert "SCHED_FIFO" in "".join(notices)
 

@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING
 
 from hopping_leg.cli.options import at_least, say, show_table
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode
-from hopping_leg.deploy.realtime import prefer_this_process, uninterrupted
+from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
 from hopping_leg.emulator.faults import KINDS, load_faults
 from hopping_leg.emulator.mode_machine import Notice
 from hopping_leg.robot import DEFAULT_ROBOT, JOINTS
@@ -84,7 +84,7 @@ def run(args: Emulate) -> None:
         ids = " and ".join(str(drive.id) for drive in robot.drives)
         say(f"Drives {ids} of {robot.robot.name} behind {port}")
         sys.stdout.flush()
-        if args.realtime and prefer_this_process() is not None:
+        if args.realtime and prefer_this_thread() is not None:
             say("Without real-time priority the drives may answer late under load.")
         server = Server(robot, port)
         server.on_turn = _Events(robot).tell

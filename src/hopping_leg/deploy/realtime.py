@@ -44,8 +44,17 @@ class RealClock:
 _PRIORITY = 60
 """Priority in SCHED_FIFO, 1 to 99; above ordinary work, below the kernel's own threads."""
 
+_NOTICE = (
+    "No permission for real-time priority (SCHED_FIFO): ticks may be late under load; run as root"
+    " or allow it with `ulimit -r` (rtprio in /etc/security/limits.conf)."
+)
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
 _SWITCH_SECONDS = 1e-4
+
+
+def prefer_this_thread() -> str | None:
+    """Give the calling thread real-time priority; return a notice where that is not permitted."""
+    return None if _schedule(0, os.SCHED_FIFO, _PRIORITY) else _NOTICE
 
 
 def prefer_this_process() -> str | None:
@@ -54,12 +63,7 @@ def prefer_this_process() -> str | None:
     One thread is not enough: whichever holds the interpreter must not be preempted either. New
     threads inherit it.
     """
-    if _schedule_all(os.SCHED_FIFO, _PRIORITY):
-        return None
-    return (
-        "No permission for real-time priority (SCHED_FIFO): ticks may be late under load; run as"
-        " root or allow it with `ulimit -r` (rtprio in /etc/security/limits.conf)."
-    )
+    return None if _schedule_all(os.SCHED_FIFO, _PRIORITY) else _NOTICE
 
 
 def _schedule_all(policy: int, priority: int) -> bool:
