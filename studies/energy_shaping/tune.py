@@ -29,7 +29,7 @@ from hopping_leg.controllers.energy_shaping.gains import (
     scale_gains,
 )
 from hopping_leg.io import write_atomically
-from hopping_leg.robot import COARSE_TIMESTEP, DEFAULT_ROBOT, Robot, load_robot
+from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
 from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.randomization import draw_twin
 from studies.shared import Row, main, once, show_rows
@@ -38,7 +38,7 @@ SETTLED = 2.0  # hops before this do not count, s
 _RATE = 1.5  # fewer hops per second than this cost
 _SKIPPED = 0.1  # cost of a skipped hop, m: about what it lacks in height
 _FLIGHT = 0.1  # cost of a lack of flight, m: a tenth of the time, 1 cm
-_KNEE, _BASE = 0.012, 0.06  # less room than this between knee or base and the ground costs, m
+_KNEE, _BASE = 0.012, 0.03  # less room than this between knee or base and the ground costs, m
 
 FIRST_GAINS = (0.85, 1.0, 1.15)
 """Factors on k0, one run each: the gain update must find its way from all of them."""
@@ -146,15 +146,11 @@ class Tune:
         return tuple(draw_twin(s, self.robot).robot for s in seeds) or (load_robot(self.robot),)
 
     def find(self) -> Row:
-        """Write the better of start and find, both calibrated; return scores, costs and gains.
-
-        The search takes the physics step of trainings, calibration and comparison the fine one.
-        """
+        """Write the better of start and find, both calibrated; return scores, costs and gains."""
         found, robot, legs = load_gains(self.start), load_robot(self.robot), self.legs
         config = RolloutConfig(robot, threads=self.threads)
         first = scale_gains(found.gains, load_robot(found.robot), robot)
-        coarse = dataclasses.replace(config, timestep=COARSE_TIMESTEP)
-        pair = [first, self.search(first, coarse)]
+        pair = [first, self.search(first, config)]
         for noise, i in itertools.product(range(2), range(2)):
             tried = evaluate([pair[i]] * 4, config, self.commands, self.seconds, noise, legs)
             pair[i] = calibrated(pair[i], list(itertools.chain(*tried)))
@@ -188,7 +184,6 @@ class Tune:
                 "candidates": [vars(candidate) for candidate in candidates],
                 "commands": self.commands,
                 "seconds": self.seconds,
-                "timestep": config.timestep,
                 "flight": self.flight,
             }
             file = self.out / "generations" / f"{generation}.json"
@@ -293,10 +288,9 @@ def cost(scores: list[CommandScore], flight: float = 0.0) -> float:
     """
     if any(np.isnan(s.median) for s in scores):
         return 500.0
-    _, _, residual = _line(scores)
+    _, scale, residual = _line(scores)
     terms = [
-        s.spread
-        + abs(r)
+        (s.spread + abs(r)) / max(scale, 0.1)  # which calibration stretches
         + 0.03 * max(0.0, _RATE - s.rate)
         + _SKIPPED * s.skipped
         + _FLIGHT * max(0.0, flight - s.flight)

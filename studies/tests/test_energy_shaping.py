@@ -66,7 +66,8 @@ def test_unit_cube_round_trip_and_shipped_gains_lie_in_the_box():
 
 
 def test_cost_ignores_what_calibration_removes_and_counts_the_rest():
-    assert cost(scores(shift=0.02, scale=0.9)) == pytest.approx(cost(scores()))
+    assert cost(scores(shift=0.02)) == pytest.approx(cost(scores()))
+    assert cost(scores(scale=0.5)) == pytest.approx(2 * cost(scores())), "it is stretched"
     for worse in ({"spread": 0.010}, {"rate": 0.5}, {"skipped": 0.1}, {"knee_clearance": -0.01}):
         assert cost(scores(**worse)) > cost(scores()) + 7, worse
     assert cost(scores(median=float("nan"))) > 100
