@@ -28,7 +28,7 @@ RESULTS = (
     "--folder runs/legs --jobs 2 --out runs/zero-shot-legs "
     "--json studies/sim_to_real/results/zero_shot_legs.json",
     "python -m studies.sim_to_real transfer --methods universal-identified universal "
-    "energy-shaping energy-shaping-identified --jobs 2 "
+    "energy-shaping energy-shaping-tuned --jobs 2 "
     "--folder runs/transfer-universal --json studies/sim_to_real/results/universal.json",
     *(
         "python -m studies.sim_to_real transfer --methods identified-belt identified cad table-1 "

@@ -48,7 +48,7 @@ METHODS = {
         Method("truth", "true parameters: what a perfect fit would find", truth=True),
         Method(ENERGY_SHAPING, "energy shaping, shipped gains", untrained=ENERGY_SHAPING),
         Method(
-            "energy-shaping-identified",
+            "energy-shaping-tuned",
             "energy shaping, tuned on what both recordings identify",
             fitted=True,
             untrained=ENERGY_SHAPING,

@@ -137,7 +137,7 @@ def test_a_twin_is_recorded_to_its_stops_and_identified_from_that_alone(tmp_path
 def test_gains_are_tuned_on_what_was_identified_and_hop_on_the_twin(tmp_path, monkeypatch):
     scored_by_exponent(monkeypatch)
     monkeypatch.setattr(steps, "TUNE", dataclasses.replace(steps.TUNE, generations=3))
-    one = chain(tmp_path, ("energy-shaping", "energy-shaping-identified"))
+    one = chain(tmp_path, ("energy-shaping", "energy-shaping-tuned"))
     for twin in one.twins:
         file = Path(one.source(twin, one.methods[1]))
         file.parent.mkdir(parents=True, exist_ok=True)

@@ -2,8 +2,8 @@
 
 The actor sees what the robot measures; the critic, which is thrown away afterwards, sees the true
 state. The noise of exploration is the same for all states and falls to a schedule; the learning
-rate follows how far a policy moves. Rollouts of a policy that is one update older, gathered beside
-the gradient steps, made it forget how to hop as the noise fell.
+rate follows how far a policy moves. Rollouts and gradient steps take turns: learning from a policy
+that is one update older, it forgets how to hop as the noise falls.
 """
 
 import copy
@@ -15,12 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.torch_layers import create_mlp
 from torch import nn
 
 from hopping_leg.envs.task import HoppingTask
 from hopping_leg.rl.checkpoint import Tree, to_torch
+from hopping_leg.rl.learner import Learner
 from hopping_leg.rl.onnx_export import Actor, DenseActor
 from hopping_leg.rl.sac import NetworkConfig
 
@@ -85,20 +85,18 @@ class Rollout(NamedTuple):
     """Standard deviation of the actions, a number."""
 
 
-class PPO:
-    """A training from nothing; ``Dagger`` has the same attributes.
+class PPO(Learner):
+    """A training from nothing.
 
-    Everything random follows from the seed, on any number of cores.
+    Everything random follows from the seed; torch sums otherwise on another number of threads.
     """
-
-    on_boundary: Callable[[], None] | None = None
-    remaining: Callable[[], float] | None = None
 
     def __init__(
         self, task: HoppingTask, config: PPOConfig, network: NetworkConfig, seed: int
     ) -> None:
+        super().__init__(task)
         torch.manual_seed(seed)
-        self.task, self.config = task, config
+        self.config = config
         self.actor = _mlp(task.observation.size, network.actor, 2)
         self._seen = task.reset()
         self.critic = _mlp(task.privileged_size, network.critic, 1)
@@ -111,38 +109,15 @@ class PPO:
         self._rate = config.learning_rate
         self._draws = torch.Generator().manual_seed(seed)
         self._average = copy.deepcopy(self.actor)
-        self.logger = Logger(None, [])
-        self.num_timesteps, self._left = 0, 1.0
-        self.seconds = {"rollouts": 0.0, "gradient steps": 0.0}
-        """Time spent on each."""
-
-    def set_logger(self, logger: Logger) -> None:
-        """Set where the curves go."""
-        self.logger = logger
-
-    @property
-    def share(self) -> float:
-        """Share of the training that is done, 0 to 1."""
-        return 1 - self._left
 
     def train_until(self, steps: int, callback: Callable[[], bool], log_interval: int) -> None:
         """Learn until so many control steps are done in all, or until the callback says no."""
-        rollouts = 0
-        while self.num_timesteps < steps and callback():
-            self._left = 1 - self.num_timesteps / steps
-            if self.remaining is not None:
-                self._left = min(self._left, self.remaining())
-            if self.on_boundary is not None:
-                self.on_boundary()
+        size = self.config.n_steps * self.task.count
+        for _ in self._rollouts(size, steps, callback, log_interval):
             self.task.reward.anneal(self.share)
             rollout = self._collect()
             self._train(rollout)
-            self.num_timesteps += self.config.n_steps * self.task.count
-            rollouts += 1
-            if rollouts % log_interval == 0:
-                self.logger.record("rollout/apex_error_m", self.task.mean_apex_error)
-                self.logger.record("rollout/reward", float(rollout.rewards.mean()))
-                self.logger.dump(self.num_timesteps)
+            self.logger.record("rollout/reward", float(rollout.rewards.mean()))
 
     def _collect(self) -> Rollout:
         began = time.monotonic()

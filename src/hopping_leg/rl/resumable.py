@@ -22,7 +22,7 @@ _REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "
 
 
 class ResumableSAC(SAC):  # type: ignore[misc]
-    """Soft actor-critic on a ``TaskVecEnv``; ``Dagger`` has the same attributes."""
+    """Soft actor-critic on a ``TaskVecEnv``; ``Learner`` has the same attributes."""
 
     on_boundary: Callable[[], None] | None = None
     remaining: Callable[[], float] | None = None

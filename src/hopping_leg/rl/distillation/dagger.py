@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from stable_baselines3.common.logger import Logger
 from torch.nn import functional
 
 from hopping_leg.arrays import Array, Array32, BoolArray
@@ -31,6 +30,7 @@ from hopping_leg.rl.distillation.students import (
     Student,
     StudentConfig,
 )
+from hopping_leg.rl.learner import Learner
 from hopping_leg.robot import GRAVITY
 
 _PUSHED, _PUSHES = 0.15, 0.5
@@ -87,35 +87,24 @@ class DaggerConfig:
         return TrueStateMpc(task.robot, self.teacher, self.planning, rate=task.options.rate)
 
 
-class Dagger:
-    """A distillation, with the names of stable-baselines3.
+class Dagger(Learner):
+    """A distillation; rollouts and gradient steps run side by side.
 
     Everything random follows from the seed, on any number of cores.
-
-    Attributes:
-        on_boundary: Called before every rollout: a state taken there continues exactly.
-        remaining: Returns the share of the budget that is left, 1 to 0; the schedules follow this
-            or the share of steps left, whichever is smaller.
     """
-
-    on_boundary: Callable[[], None] | None = None
-    remaining: Callable[[], float] | None = None
 
     def __init__(
         self, task: HoppingTask, config: DaggerConfig, network: StudentConfig, seed: int
     ) -> None:
+        super().__init__(task)
         torch.manual_seed(seed)
-        self.task, self.config = task, config
+        self.config = config
         self._hidden = HiddenState(task.legs, task.believed) if config.hidden_weight else None
         unseen = self._hidden.size if self._hidden else 0
         self.student = network.make(task.observation, unseen)
         self.optimizer = torch.optim.Adam(self.student.parameters(), lr=config.learning_rate)
         self.teacher = config.make_teacher(task)
         self.teacher.watch(task.legs)
-        self.logger = Logger(None, [])
-        self.num_timesteps = 0
-        self.seconds = {"rollouts": 0.0, "gradient steps": 0.0}
-        """Time spent on each; they run side by side."""
         self._actor: Student = copy.deepcopy(self.student)
         self._actor.correction = 0.0
         size = config.n_steps * task.count
@@ -125,7 +114,6 @@ class Dagger:
         )  # fmt: skip
         self._draws = torch.Generator().manual_seed(seed)
         self._mixing = np.random.default_rng([seed, 1])
-        self._left = 1.0
         self._most_force = self._most_forces() if config.impulse else None
         self._begin(task.reset())
 
@@ -145,34 +133,15 @@ class Dagger:
         self._memory = torch.zeros(self.task.count, self.student.memory_size)
         self._label = self._teach()
 
-    def set_logger(self, logger: Logger) -> None:
-        """Set where the curves go."""
-        self.logger = logger
-
     def train_until(self, steps: int, callback: Callable[[], bool], log_interval: int) -> None:
         """Learn until so many control steps are done in all, or until the callback says no."""
-        rollouts = 0
+        size = self.config.n_steps * self.task.count
         with ThreadPoolExecutor(1, thread_name_prefix="rollout") as beside:
-            while self.num_timesteps < steps and callback():
-                self._left = 1 - self.num_timesteps / steps
-                if self.remaining is not None:
-                    self._left = min(self._left, self.remaining())
-                if self.on_boundary is not None:
-                    self.on_boundary()
+            for _ in self._rollouts(size, steps, callback, log_interval):
                 self._actor.load_state_dict(self.student.state_dict())
                 rollout = beside.submit(self._collect)
                 self._train()
                 self._buffer.add(rollout.result())
-                self.num_timesteps += self.config.n_steps * self.task.count
-                rollouts += 1
-                if rollouts % log_interval == 0:
-                    self.logger.record("rollout/apex_error_m", self.task.mean_apex_error)
-                    self.logger.dump(self.num_timesteps)
-
-    @property
-    def share(self) -> float:
-        """Share of the training that is done, 0 to 1."""
-        return 1 - self._left
 
     @property
     def mixing(self) -> float:
