@@ -90,7 +90,8 @@ def find_bounces(height: Array, clearance: Array) -> IntArray:
     from scipy.signal import find_peaks  # takes a second, which no other part of the package needs
 
     peaks, _ = find_peaks(height, prominence=BOUNCE)
-    return peaks[clearance[peaks] < FLIGHT_CLEARANCE]
+    aloft: IntArray = peaks[clearance[peaks] < FLIGHT_CLEARANCE]
+    return aloft
 
 
 def count_skipped(

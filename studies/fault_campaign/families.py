@@ -85,7 +85,8 @@ class Family:
 
 
 def _drive(rng: np.random.Generator) -> Literal["hip", "knee", "both"]:
-    return rng.choice(["hip", "knee", "both"]).item()
+    drive: Literal["hip", "knee", "both"] = rng.choice(["hip", "knee", "both"]).item()
+    return drive
 
 
 def _faulty(kind: str, values: Values = lambda _: {}) -> Draw:

@@ -62,7 +62,8 @@ class JointPD:
         self._tick = min(self._tick + 1, len(self.position) - 1)
         behind = self.position[self._tick] - measurement.q[:, 0]
         slower = self.velocity[self._tick] - measurement.qd[:, 0]
-        return self._stiffness * behind + self._damping * slower
+        torque: Array = self._stiffness * behind + self._damping * slower
+        return torque
 
     def internals(self) -> dict[str, Array]:
         """Return the targets of the last ``act``, each (n,)."""

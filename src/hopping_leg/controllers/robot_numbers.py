@@ -97,4 +97,5 @@ def robot_numbers(robot: Robot) -> Array:
         ]
     )
     middle, spread = MIDDLES_AND_SPREADS.T
-    return np.clip((values - middle) / spread, -MOST, MOST)
+    scaled: Array = np.clip((values - middle) / spread, -MOST, MOST)
+    return scaled

@@ -114,7 +114,8 @@ class Squat:
         lever = hip_lever / knee_lever if abs(hip_lever) < abs(knee_lever) else 0.0
         torque: Array = np.array([gravity[0] + lever * (knee - gravity[1]), knee])
         self._samples.append((float(share), q.copy(), torque))
-        return torque + _moving(share) * self._friction
+        asked: Array = torque + _moving(share) * self._friction
+        return asked
 
     def findings(self) -> SquatFindings:
         """Return what the squat looked like."""

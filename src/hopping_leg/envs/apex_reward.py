@@ -96,7 +96,8 @@ def apex_reward(robot: Robot, config: ApexRewardConfig, rate: float) -> Reward:
         base = kinematics.base_clearance(robot, t.height)
         knee = kinematics.knee_clearance(robot, t.height, t.q)
         inside = np.maximum(1 - base / _BASE_MARGIN, 0.0) + np.maximum(1 - knee / _KNEE_MARGIN, 0.0)
-        return inside + TOUCH * (np.minimum(base, knee) < _TOUCH_MARGIN)
+        closeness: Array = inside + TOUCH * (np.minimum(base, knee) < _TOUCH_MARGIN)
+        return closeness
 
     return Reward(
         (

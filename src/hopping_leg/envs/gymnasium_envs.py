@@ -70,7 +70,8 @@ class _TaskView:
         data.qpos[0], data.qpos[1:] = legs.height[leg], legs.q[leg]
         mujoco.mj_forward(renderer.model, data)
         renderer.update_scene(data, camera="side")
-        return renderer.render()
+        image: Image = renderer.render()
+        return image
 
     def close_extras(self, **kwargs: Any) -> None:  # noqa: ANN401
         """Free the renderer."""

@@ -42,13 +42,15 @@ def paper_reward(robot: Robot, config: PaperRewardConfig = PaperRewardConfig()) 
     fastest = np.square(robot.of_joints("no_load_speed")[None])
 
     def energy_gain(t: Transition) -> Array:  # Ge, m2/s2 + m2
-        return np.square(t.rate) + np.square(t.height - rest)
+        gain: Array = np.square(t.rate) + np.square(t.height - rest)
+        return gain
 
     def height_barrier(t: Transition) -> Array:  # Ph: 0 below the desired height
         excess = t.height - t.command
         growth = np.exp(excess)
         growth = 1 - growth if c.barrier == "printed" else growth
-        return np.heaviside(excess, _ONE) * growth
+        barrier: Array = np.heaviside(excess, _ONE) * growth
+        return barrier
 
     def joint_velocity_penalty(t: Transition) -> Array:  # Pjv, where a joint is faster, rad2/s2
         return sum_of_joints(np.maximum(np.square(t.qd) - fastest, _ZERO))

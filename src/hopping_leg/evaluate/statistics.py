@@ -37,7 +37,8 @@ def bootstrap(
     rng = np.random.default_rng(seed)
     draws = rng.integers(len(units), size=(RESAMPLES, len(units)))
     values = np.array([statistic([units[i] for i in draw]) for draw in draws])
-    return np.percentile(values, _TAILS, axis=0)
+    interval: Array = np.percentile(values, _TAILS, axis=0)
+    return interval
 
 
 def median_interval(runs: Sequence[Array], seed: int, least: int = 2) -> tuple[float, float]:

@@ -105,7 +105,8 @@ def _parabolas(recording: Recording, values: Array, half: float) -> Array:
     first = np.clip(np.arange(len(time)) - half, 0, len(time) - 2 * half - 1)
     rows = first[:, None] + np.arange(2 * half + 1)
     t = (time[rows] - time[:, None])[..., None] ** np.arange(3)
-    return np.linalg.pinv(t) @ values[rows]
+    found: Array = np.linalg.pinv(t) @ values[rows]
+    return found
 
 
 def _falling(recording: Recording, robot: Robot) -> tuple[float, float]:
@@ -130,7 +131,8 @@ def _told_acceleration(recording: Recording, robot: Robot) -> Array:
     inner = np.vecdot(matrix[:, 0, 1:], qdd) + bias[:, 0] + mass * gravity - robot.mass * GRAVITY
     free = torque - np.einsum("nij,nj->ni", matrix[:, 1:, 1:], qdd) - bias[:, 1:]
     lever = jacobian[:, 1, ::-1] * [1.0, -1.0] / np.linalg.det(jacobian)[:, None]
-    return (np.vecdot(lever, free) - inner) / (mass + np.vecdot(lever, matrix[:, 1:, 0]))
+    told: Array = (np.vecdot(lever, free) - inner) / (mass + np.vecdot(lever, matrix[:, 1:, 0]))
+    return told
 
 
 def flights(recording: Recording, robot: Robot) -> list[Flight]:

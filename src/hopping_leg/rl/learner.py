@@ -1,10 +1,21 @@
 """What trainings by rollouts of a ``HoppingTask`` have in common."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 from stable_baselines3.common.logger import Logger
 
 from hopping_leg.envs.task import HoppingTask
+
+
+@dataclass(frozen=True)
+class NetworkConfig:
+    """Networks of actor and critic."""
+
+    actor: tuple[int, ...]
+    """Hidden layers of the actor: ReLU in SAC, ELU in PPO."""
+    critic: tuple[int, ...]
+    """Hidden layers of the critic."""
 
 
 class Learner:

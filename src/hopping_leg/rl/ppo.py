@@ -20,16 +20,12 @@ from torch import nn
 
 from hopping_leg.envs.task import HoppingTask
 from hopping_leg.rl.checkpoint import Tree, to_torch
-from hopping_leg.rl.learner import Learner
+from hopping_leg.rl.learner import Learner, NetworkConfig
 from hopping_leg.rl.onnx_export import Actor, DenseActor
-from hopping_leg.rl.sac import NetworkConfig
 
-_LEAST_RATE, _MOST_RATE = 1e-5, 3e-3
-"""Between which the learning rate adapts."""
-_AVERAGED = 0.97
-"""Share that an update leaves of the mean of the actors so far, which is the policy."""
-_OUTSIDE = 0.1
-"""Weight of the square by which mean actions leave [-1, 1]."""
+_LEAST_RATE, _MOST_RATE = 1e-5, 3e-3  # between which the learning rate adapts
+_AVERAGED = 0.97  # share that an update leaves of the actors' mean so far, which is the policy
+_OUTSIDE = 0.1  # weight of the square by which mean actions leave [-1, 1]
 
 
 @dataclass(frozen=True)

@@ -26,19 +26,12 @@ from hopping_leg.sim import NO_NOISE, compile_physics
 from hopping_leg.sim.any_leg import draw_any_leg
 from hopping_leg.workers import ProcessWorkers, RayWorkers
 
-_REACHED = 0.005
-"""Median error with which the teacher reaches a height on the robot, m."""
-
+_REACHED = 0.005  # median error with which the teacher reaches a height on the robot, m
+_REACHED_DRAWN = 0.006  # the same on a drawn leg of the paper's size, m
 _HEIGHTS, _LEAST = 9, 2  # tried on a drawn leg, and reached at least
 _SECONDS, _STEP = 3.5, 5e-4
-_REACHED_DRAWN = 0.006
-"""The same on a drawn leg of the paper's size, m."""
-
-_AT_ONCE = 8
-"""Legs in one task of a worker; what it found is kept at its end."""
-
-_BETWEEN_SEEDS = 1_000_000
-"""Legs of which no two trainings draw the same."""
+_AT_ONCE = 8  # legs in one task of a worker; what it found is kept at its end
+_BETWEEN_SEEDS = 1_000_000  # legs of which no two trainings draw the same
 
 
 def within_reach(recipe: Recipe, robot: Robot) -> tuple[Recipe, float]:

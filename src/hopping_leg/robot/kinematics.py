@@ -87,13 +87,15 @@ def jacobian(robot: Geometry, q: Array) -> Array:
 
 def foot_velocity(robot: Geometry, q: Array, qd: Array) -> Array:
     """Return the foot's velocity in the hip's frame, (x_down, y) rates, m/s, (..., 2)."""
-    return np.einsum("...ij,...j->...i", jacobian(robot, q), qd)
+    velocity: Array = np.einsum("...ij,...j->...i", jacobian(robot, q), qd)
+    return velocity
 
 
 def stance_height(robot: Geometry, q: Array) -> Array:
     """Return the base height if the foot stands on flat, hard ground, m, (...)."""
     lengths = np.stack([robot.thigh.length, robot.shank.length], axis=-1)
-    return np.vecdot(np.cos(np.add.accumulate(q, axis=-1)), lengths) + robot.foot.radius
+    height: Array = np.vecdot(np.cos(np.add.accumulate(q, axis=-1)), lengths) + robot.foot.radius
+    return height
 
 
 def foot_clearance(robot: Geometry, height: Array, q: Array) -> Array:

@@ -27,7 +27,8 @@ def braking_times(robot: Robot, rate: float) -> Array:
     """
     inertia = np.diag(dynamics.mass_matrix(robot, np.zeros(2)))[1:]
     _, _, slope = _torque_speed_line(robot)
-    return 1 / rate + inertia / slope
+    time: Array = 1 / rate + inertia / slope
+    return time
 
 
 def command_limits(robot: Robot) -> tuple[float, float]:

@@ -55,11 +55,13 @@ class Track:
     @property
     def time(self) -> Array:
         """Time of each row, s, (rows,)."""
-        return self._rows[0]
+        time: Array = self._rows[0]
+        return time
 
     def field(self, name: str) -> Array:
         """Return one of ``FIELDS``, (rows,)."""
-        return self._rows[1 + FIELDS.index(name)]
+        column: Array = self._rows[1 + FIELDS.index(name)]
+        return column
 
     def extend(self, time: Array, values: Array) -> None:
         """Add rows that are later than all others: times (rows,) and values (fields, rows)."""

@@ -51,7 +51,8 @@ def foot_force_torque(leg: LegView, push: Array, side: Array) -> Array:
 
     A positive ``push`` presses the foot to the ground, N, (n,); ``side`` is the force forwards.
     """
-    return np.einsum("nij,ni->nj", leg.jacobian, np.stack([push, side], axis=-1))
+    torque: Array = np.einsum("nij,ni->nj", leg.jacobian, np.stack([push, side], axis=-1))
+    return torque
 
 
 def leg_force(robot: Robot, leg: LegView, torque: Array) -> Array:
@@ -63,7 +64,8 @@ def leg_force(robot: Robot, leg: LegView, torque: Array) -> Array:
     determinant = a * d - b * c
     least = 0.1 * robot.thigh.length * robot.shank.length
     bounded = np.where(determinant < 0, -1.0, 1.0) * np.maximum(np.abs(determinant), least)
-    return (d * torque[:, 0] - c * torque[:, 1]) / bounded
+    force: Array = (d * torque[:, 0] - c * torque[:, 1]) / bounded
+    return force
 
 
 def retraction(start: Array, end: Array, elapsed: Array, duration: Gain) -> tuple[Array, Array]:
@@ -107,4 +109,5 @@ class TouchdownDetector:
         self._seen[0, 0] = leg.rate - np.einsum("ni,ni->n", leg.jacobian[:, 0], planned)
         self._seen[0, 1] = leg_force(self._robot, leg, torque)
         excess, force = np.sort(self._seen, axis=0)[len(self._seen) // 2]
-        return (excess < gains.touchdown_rate) | (force > gains.touchdown_force)
+        landed: BoolArray = (excess < gains.touchdown_rate) | (force > gains.touchdown_force)
+        return landed

@@ -159,7 +159,8 @@ class TrueStateMpc:
     @property
     def pushing(self) -> BoolArray:
         """Which legs push, (n,)."""
-        return self._phase == hop_law.PUSH
+        pushing: BoolArray = self._phase == hop_law.PUSH
+        return pushing
 
     @property
     def folding(self) -> BoolArray:
@@ -167,7 +168,8 @@ class TrueStateMpc:
         legs = self._legs
         rests = (self._phase == hop_law.LANDING) & (np.abs(legs.height_rate) < hop_law.REST_SPEED)
         leaves = (self._phase == hop_law.FLIGHT) & (legs.foot_clearance() <= 0)
-        return rests | leaves
+        folding: BoolArray = rests | leaves
+        return folding
 
     def state(self) -> dict[str, Array]:
         """Return what is remembered from tick to tick."""

@@ -5,7 +5,7 @@ episode and what the critics see are chosen here.
 """
 
 from hopping_leg.envs import PaperRewardConfig, TaskConfig
-from hopping_leg.rl import recipe, sac
+from hopping_leg.rl import learner, recipe, sac
 
 PAPER = recipe.Recipe(
     name="paper",
@@ -17,7 +17,7 @@ PAPER = recipe.Recipe(
     ),
     reward=PaperRewardConfig(),
     algorithm=sac.SACConfig(),
-    network=sac.NetworkConfig(actor=(256, 256, 128, 128), critic=(256, 256, 128, 128)),
+    network=learner.NetworkConfig(actor=(256, 256, 128, 128), critic=(256, 256, 128, 128)),
     schedule=recipe.Schedule(num_envs=16, steps=240_000, log_every=32),
     selection=recipe.SelectionConfig(eval_every=8_000),
     robot="legv2-paper",

@@ -9,8 +9,8 @@ from dataclasses import replace
 
 from hopping_leg.envs import ApexRewardConfig
 from hopping_leg.rl import ppo, recipe
+from hopping_leg.rl.learner import NetworkConfig
 from hopping_leg.rl.recipes.fast import FAST
-from hopping_leg.rl.sac import NetworkConfig
 
 RL = recipe.Recipe(
     name="rl",
