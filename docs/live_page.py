@@ -36,9 +36,8 @@ from hopping_leg.robot import (
 from hopping_leg.robot.parameters import PAPER_HEIGHT
 from hopping_leg.sim import CONTROL_RATE, NoiseAndDelay
 from hopping_leg.sim.channel import DELAY_DEPTH
-from hopping_leg.sim.leg_physics import SCRATCH
 from hopping_leg.sim.leg_table import LEG, leg_table
-from hopping_leg.sim.stepper import COMMAND, MEMORY
+from hopping_leg.sim.stepper import COMMAND, MEMORY, SCRATCH
 from hopping_leg.viewer import live_leg
 
 FOLDER = Path(__file__).parent / "live"
@@ -85,7 +84,7 @@ def data(policies: dict[str, str]) -> dict[str, Any]:
             "row": _places(LEG),
             "memory": _places(MEMORY),
             "command": COMMAND,
-            "rows": SCRATCH[0] * SCRATCH[1],
+            "rows": SCRATCH,
         },
         "noise": dataclasses.asdict(NoiseAndDelay()),
         "soft_limits": dataclasses.asdict(SoftLimits()),

@@ -39,13 +39,12 @@ def _functions() -> dict[str, tuple[Any, Any]]:
     from numba import carray, types
 
     from hopping_leg.sim import stepper
-    from hopping_leg.sim.leg_physics import SCRATCH
     from hopping_leg.sim.leg_table import LEG
 
     plain = numba.njit(error_model="numpy", forceinline=True)
     send, step_leg = stepper.send, plain(stepper.step_leg.py_func)
     read_sensors = plain(stepper.read_sensors.py_func)
-    command_size = stepper.COMMAND
+    command_size, scratch_shape = stepper.COMMAND, stepper.SCRATCH
     numbers = types.CPointer(types.float64)
     leg = types.CPointer(numba.from_dtype(LEG))
     memory = types.CPointer(numba.from_dtype(stepper.MEMORY))
@@ -53,9 +52,9 @@ def _functions() -> dict[str, tuple[Any, Any]]:
 
     def step(p, leg, state, past, depth, command, arrival, rows, push, steps, dt):  # noqa: ANN001, ANN202
         """Send a command, (``COMMAND``,), and advance the leg; ``rows`` is scratch."""
-        own = carray(leg, 1)[0]
-        send(own, carray(command, command_size), arrival)
-        ring, scratch = carray(past, (depth, 6)), carray(rows, SCRATCH)
+        own = carray(leg, 1)
+        send(own[0], carray(command, command_size), arrival)
+        ring, scratch = carray(past, (depth, 6)), carray(rows, scratch_shape)
         step_leg(carray(p, 1)[0], carray(state, 6), own, ring, scratch, push, steps, dt)
 
     def read(p, leg, past, depth, draws, reading, dt):  # noqa: ANN001, ANN202

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hopping_leg.robot import GRAVITY, JOINTS, Boom, DriveMismatch, dynamics, get_spec, load_robot
-from hopping_leg.sim import LegSimulator, leg_physics
+from hopping_leg.sim import LegSimulator, lanes, leg_physics
 from hopping_leg.sim.compiled import compiled
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, Range, sample
 from tests.sim.legs import with_joints, with_reality, with_strong_motors
@@ -215,11 +215,23 @@ def test_the_stepper_is_mujoco_for_legs_of_any_kind(name, reality, fixed_base, c
 
 
 @compiled
+def elementary(x):
+    return (*lanes.sincos(x), lanes.exp(0.01 * x))
+
+
+def test_sine_cosine_and_exponential_are_the_libraries_to_rounding():
+    rng = np.random.default_rng(0)
+    angles = np.concatenate([rng.uniform(-9, 9, 2000), rng.uniform(-6e4, 6e4, 2000), [0.0]])
+    found = np.transpose([elementary(angle) for angle in angles])
+    assert np.abs(found[:2] - [np.sin(angles), np.cos(angles)]).max() < 3e-16
+    assert np.abs(found[2] / np.exp(0.01 * angles) - 1).max() < 5e-16
+
+
+@compiled
 def acceleration(m, force, moving, friction, rows, count, start):
     """Return the same as the function that is compiled into others; kept between sessions."""
-    return leg_physics.constrained_acceleration(
-        m, force, moving, friction, rows, count, start, moving[1] > 0
-    )
+    first = lanes.side_by_side(rows, leg_physics.ROW)
+    return leg_physics.constrained_acceleration(m, force, moving, friction, first, count, start)
 
 
 @given(
@@ -233,16 +245,17 @@ def test_the_acceleration_obeys_gauss_principle(seed, count, sliding, boom):
     mass, (force, start) = root @ root.T, rng.normal(0, [[100.0], [1000.0]], (2, n))
     loss = np.where([sliding >> i & 1 for i in range(3)], 10 ** rng.uniform(-2, 2, 3), 0.0)
     stiff, rest = 10 ** rng.uniform(0, 3, 3), rng.normal(0, 100, 3)
-    rows = np.zeros(leg_physics.SCRATCH)
-    rows[:count] = rng.normal(0, 1, (count, 6)) * [1, 1, 1, 100, 0, boom]
-    rows[:count, 4] = 10 ** rng.uniform(-1, 3, count)
+    rows = np.zeros((leg_physics.ROWS, 7))
+    rows[:count] = rng.normal(0, 1, (count, 7)) * [1, 1, 1, boom, 100, 0, 0]
+    rows[:count, 5] = 10 ** rng.uniform(-1, 3, count)
     friction = tuple(map(tuple, (loss, stiff, rest, loss / stiff)))
     numbers, start = tuple(mass[:3, :3][np.triu_indices(3)]), np.append(start, 0.0)[:4]
-    moving = (tuple(mass[:3, 3]), mass[3, 3], force[3]) if boom else ((0.0, 0.0, 0.0), 0.0, 0.0)
-    found = acceleration(numbers, tuple(force[:3]), moving, friction, rows, count, tuple(start))
-    a, pushing = np.array(found[:n]), rows[:count, [0, 1, 2, 5][:n]]
-    miss = np.minimum(pushing @ a - rows[:count, 3], 0.0)
-    given_by_rows = -(rows[:count, 4] * miss) @ pushing
+    moving = (tuple(mass[:3, 3]), mass[3, 3], force[3]) if boom else ((0.0, 0.0, 0.0), 1.0, 0.0)
+    force3, flat = tuple(force[:3]), rows.ravel()
+    found = acceleration(numbers, force3, (*moving, boom), friction, flat, count, tuple(start))
+    a, pushing = np.array(found[:n]), rows[:count, :n]
+    miss = np.minimum(pushing @ a - rows[:count, 4], 0.0)
+    given_by_rows = -(rows[:count, 5] * miss) @ pushing
     given_by_friction = np.zeros(n)
     given_by_friction[:3] = np.clip(-stiff * (a[:3] - rest), -loss, loss)
     residual = mass @ a - force - given_by_rows - given_by_friction

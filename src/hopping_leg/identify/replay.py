@@ -16,15 +16,14 @@ import numpy as np
 
 from hopping_leg.arrays import Array, Record, Records
 from hopping_leg.sim.compiled import compiled, inlined
-from hopping_leg.sim.leg_physics import SCRATCH
 from hopping_leg.sim.stepper import (
     MEMORY,
+    SCRATCH,
     after_gear,
     asked,
     dry_friction,
     motor_torque,
     step_leg,
-    step_leg_on_boom,
     through_transmission,
 )  # fmt: skip
 
@@ -214,10 +213,7 @@ def _replay_window(
                 many, where = 1, state.copy()
             elif moves:
                 integral += dt * (target - seen[:2])
-            if p.boom_radius > 0:
-                step_leg_on_boom(p, where, memory, none, scratch, 0.0, many, dt)
-            else:
-                step_leg(p, where, memory, none, scratch, 0.0, many, dt)
+            step_leg(p, where, leg, none, scratch, 0.0, many, dt)
             if step < 0:  # a state's speeds belong half a step before
                 for joint in range(2):
                     w = seen[2 + joint]

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import numba
 from numba.core import config
 
-_SOURCES = ("compiled.py", "leg_physics.py", "stepper.py")
+_SOURCES = ("compiled.py", "lanes.py", "leg_physics.py", "stepper.py")
 """Files whose functions others call. Of what calls them, numba tracks the changes itself."""
 
 _OPTIONS = {"nogil": True, "error_model": "numpy"}
@@ -63,7 +63,8 @@ def compiled(function: Function) -> Function:
 
 def inlined(function: Function) -> Function:
     """Compile a function into those that call it; LLVM does that in half of numba's time."""
-    result: Function = numba.njit(forceinline=True, **_OPTIONS)(function)
+    alone = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # nothing else calls it
+    result: Function = numba.njit(forceinline=True, **alone, **_OPTIONS)(function)
     return result
 
 

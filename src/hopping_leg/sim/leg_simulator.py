@@ -14,6 +14,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.robot import CONTROL_RATE, TIMESTEP, Robot, kinematics
 from hopping_leg.sim import stepper
 from hopping_leg.sim.compiled import announce
+from hopping_leg.sim.lanes import WIDTH
 from hopping_leg.sim.leg_table import LEG, leg_geometry, leg_table
 
 _STEPS_PER_THREAD = 4000  # Physics steps for which it is worth waking another thread
@@ -59,7 +60,8 @@ class LegSimulator:
             raise UsageError(f"{len(robots)} robots were given for {count} legs; give one each.")
         self.threads, self.fixed_base = threads or os.cpu_count() or 1, fixed_base
         parts = min(self.threads, max(count, 1), 1 + count * self.substeps // _STEPS_PER_THREAD)
-        ends = np.linspace(0, count, parts + 1).astype(int).tolist()
+        groups = np.linspace(0, -(-count // WIDTH), parts + 1).astype(int)
+        ends = np.minimum(groups * WIDTH, count).tolist()
         self._parts = list(itertools.pairwise(ends))
         self.state: Array = np.zeros((count, 6))
         self.height, self.height_rate = self.state[:, 0], self.state[:, 3]

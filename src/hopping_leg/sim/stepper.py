@@ -2,8 +2,9 @@
 
 At every physics step, in this order: the commands that arrive, the drive's own PD, software limit,
 gain, current loop, torque-speed line and saturation, cogging and gear loss; friction, contact,
-stops and transmission; the new velocity and position. Legs do not know of each other, so that the
-results are the same with any number of threads, which run without the interpreter's lock.
+stops and transmission; the new velocity and position. Legs do not know of each other, though eight
+go side by side (``lanes``), so that the results are the same in any company and with any number of
+threads, which run without the interpreter's lock.
 """
 
 import math
@@ -11,18 +12,11 @@ import math
 import numpy as np
 
 from hopping_leg.arrays import Array, Record, Records
+from hopping_leg.sim import leg_physics as physics
 from hopping_leg.sim.compiled import compiled, inlined
-from hopping_leg.sim.leg_physics import (
-    SCRATCH,
-    add_contacts,
-    add_stops,
-    constrained_acceleration,
-    mass_matrix,
-    rotor_acceleration,
-    solve,
-    solve_forward,
-    times,
-)  # fmt: skip
+from hopping_leg.sim.lanes import WIDTH, Number, any_of, exp, side_by_side, sincos, spread, where
+from hopping_leg.sim.leg_physics import ROW, ROWS, Vector
+from hopping_leg.sim.leg_table import LEG
 
 COMMANDS = 8
 """Commands under way at most, the one that is in force not counted."""
@@ -54,6 +48,25 @@ MEMORY = np.dtype(
 )
 """What a leg remembers besides its state, all float64."""
 
+_INBOX = np.dtype(
+    [("command", "10f8"), ("motors", "6f8"), ("asked", "2f8"), ("in_force", "f8"), ("due", "f8")]
+)
+"""Scratch of what a leg exchanges alone: its command; its motors' angles, speeds, torques; torques
+asked for; the share of a step in which the last command holds; when the next arrives, s."""
+
+_MOTORS, _ASKED, _IN_FORCE, _DUE = COMMAND, COMMAND + 6, COMMAND + 8, COMMAND + 9
+
+_MOTION = np.dtype([("state", np.float64, (6,)), ("push", np.float64)])
+_OF_MEMORY = LEG.itemsize // 8  # where lanes of a table's row end
+_OF_STATE = _OF_MEMORY + MEMORY.itemsize // 8
+_OF_SCRATCH = _OF_STATE + 7
+_CHANGING = 13 + len(LOADS)  # numbers of a memory before its command, which steps change
+_CONSTRAINTS = ROWS * ROW.itemsize // 8
+
+SCRATCH = _CONSTRAINTS + _INBOX.itemsize // 8
+"""Numbers of the scratch of one leg."""
+
+_ALOFT = 1e6  # height of a base that stays where it is, so that nothing touches the ground, m
 _LOSS_SPEED = 0.1  # joint speed below which a gear's loss fades: power has no direction at rest
 
 
@@ -74,42 +87,33 @@ def send(memory: Record, command: Array, arrival: float) -> None:
 
 
 @inlined
-def copy_memory(source: Record, target: Record) -> None:
-    """Copy what a leg's next steps depend on."""
-    for i in range(4):
-        target.rotor[i] = source.rotor[i]
-    for i in range(4):
-        target.acceleration[i] = source.acceleration[i]
-    target.forward = source.forward
-    for i in range(2):
-        target.motor_torque[i] = source.motor_torque[i]
-    for i in range(COMMAND):
-        target.command[i] = source.command[i]
-    for k in range(int(source.waiting)):
-        for i in range(1 + COMMAND):
-            target.pending[k, i] = source.pending[k, i]
-    target.waiting = source.waiting
-
-
-@inlined
-def asked(command: Array, joint: int, angle: float, speed: float) -> float:
+def asked(command: Array, joint: int, angle: Number, speed: Number) -> Number:
     """Return the torque that a command asks of a joint's drive."""
-    torque: float = command[joint]
-    if command[2 + joint] != 0 or command[6 + joint] != 0:
-        torque += command[2 + joint] * (command[4 + joint] - angle)
-        torque += command[6 + joint] * (command[8 + joint] - speed)
+    stiffness, damping = command[2 + joint], command[6 + joint]
+    torque, own = command[joint], (stiffness != 0.0) | (damping != 0.0)
+    if any_of(own):
+        more = stiffness * (command[4 + joint] - angle) + damping * (command[8 + joint] - speed)
+        torque = where(own, torque + more, torque)
     return torque
 
 
 @inlined
-def receive(
-    memory: Record, now: float, dt: float, t1: float, w1: float, t2: float, w2: float
-) -> tuple[float, float, float]:
-    """Take the commands that arrive in a step.
+def open_inbox(memory: Record, inbox: Array, lane: int) -> None:
+    """Show a leg's command that is in force, and when the next arrives."""
+    for i in range(COMMAND):
+        inbox[i, lane] = memory.command[i]
+    inbox[_DUE, lane] = memory.pending[0, 0] if memory.waiting > 0 else np.inf
 
-    Return the torques asked for, mean over the step, and the share of it in which the last command
-    was in force.
+
+@inlined
+def receive(memory: Record, inbox: Array, lane: int, now: float, dt: float) -> None:
+    """Take the commands of one leg that arrive in a step.
+
+    Set the torques asked for, mean over the step, and the share of it in which the last command was
+    in force.
     """
+    t1, t2 = inbox[_MOTORS, lane], inbox[_MOTORS + 1, lane]
+    w1, w2 = inbox[_MOTORS + 2, lane], inbox[_MOTORS + 3, lane]
     hip = knee = 0.0
     rest = 1.0
     arrived = 0
@@ -123,20 +127,20 @@ def receive(
         for i in range(COMMAND):
             memory.command[i] = memory.pending[arrived, 1 + i]
         arrived += 1
-    if arrived > 0:
-        for k in range(arrived, waiting):
-            for i in range(1 + COMMAND):
-                memory.pending[k - arrived, i] = memory.pending[k, i]
-        memory.waiting = waiting - arrived
-    hip += rest * asked(memory.command, 0, t1, w1)
-    knee += rest * asked(memory.command, 1, t2, w2)
-    return hip, knee, rest
+    for k in range(arrived, waiting):
+        for i in range(1 + COMMAND):
+            memory.pending[k - arrived, i] = memory.pending[k, i]
+    memory.waiting = waiting - arrived
+    inbox[_ASKED, lane] = hip + rest * asked(memory.command, 0, t1, w1)
+    inbox[_ASKED + 1, lane] = knee + rest * asked(memory.command, 1, t2, w2)
+    inbox[_IN_FORCE, lane] = rest
+    open_inbox(memory, inbox, lane)
 
 
 @inlined
 def motor_torque(
-    p: Record, joint: int, torque: float, before: float, speed: float
-) -> tuple[float, float]:
+    p: Record, joint: int, torque: Number, before: Number, speed: Number
+) -> tuple[Number, Number]:
     """Return what the motor gives, at the joint, if asked for ``torque`` and giving ``before``.
 
     Where it drives, the torque-speed line bounds it: from the stall torque at rest to none at the
@@ -149,70 +153,70 @@ def motor_torque(
     upper = min(max(p.stall_torque[joint] - drop, 0.0), p.saturation[joint])
     lower = max(min(-p.stall_torque[joint] - drop, 0.0), -p.saturation[joint])
     given = min(max(free, lower), upper)
-    limited = within != torque or given != free
-    return given, 0.0 if limited else p.follow[joint] * p.gain[joint]
+    limited = (within != torque) | (given != free)
+    return given, where(limited, 0.0, p.follow[joint] * p.gain[joint])
 
 
 @inlined
 def after_arrival(
-    p: Record, command: Array, joint: int, mean: float, angle: float, speed: float
-) -> float:
-    """Return the motor's torque at the end of a step in which a command arrived.
+    p: Record, command: Array, joint: int, in_force: Number, mean: Number, angle: Number,
+    speed: Number,
+) -> Number:  # fmt: skip
+    """Return the motor's torque at the end of a step in which a command may have arrived.
 
     It is the new command's, no mean of both; a current loop that lags knows the mean alone.
     """
-    if p.follow[joint] < 1:
-        return mean
     given, _ = motor_torque(p, joint, asked(command, joint, angle, speed), mean, speed)
-    return given
+    return where((in_force < 1.0) & (p.follow[joint] == 1.0), given, mean)
 
 
 @inlined
-def after_gear(p: Record, joint: int, torque: float, angle: float, speed: float) -> float:
+def after_gear(p: Record, joint: int, torque: Number, angle: Number, speed: Number) -> Number:
     """Return what arrives at the joint: with cogging, less what the gear loses."""
-    if p.ripple[joint] != 0:
-        torque += p.ripple[joint] * math.sin(p.ripple_periods[joint] * angle)
-    if p.log_efficiency[joint] < 0:
+    cogs = p.ripple[joint] != 0.0
+    if any_of(cogs):
+        sine, _ = sincos(p.ripple_periods[joint] * angle)
+        torque = where(cogs, torque + p.ripple[joint] * sine, torque)
+    if any_of(p.log_efficiency[joint] < 0.0):
         share = speed / math.sqrt(speed * speed + _LOSS_SPEED * _LOSS_SPEED)
-        torque *= math.exp(p.log_efficiency[joint] * (share if torque > 0 else -share))
+        torque = torque * exp(p.log_efficiency[joint] * where(torque > 0.0, share, -share))
     return torque
 
 
 @inlined
-def dry_friction(p: Record, joint: int, torque: float, speed: float) -> float:
+def dry_friction(p: Record, joint: int, torque: Number, speed: Number) -> Number:
     """Return a joint's dry friction under a motor's torque (Coulomb, load, Stribeck)."""
-    friction: float = p.friction[joint] + p.load_friction[joint] * abs(torque)
-    if p.stiction[joint] > 0 and abs(speed) < 6 * p.stiction_speed[joint]:
-        friction += p.stiction[joint] * math.exp(-((speed / p.stiction_speed[joint]) ** 2))
+    friction = p.friction[joint] + p.load_friction[joint] * abs(torque)
+    sticks = (p.stiction[joint] > 0.0) & (abs(speed) < 6.0 * p.stiction_speed[joint])
+    if any_of(sticks):
+        share = speed / p.stiction_speed[joint]
+        more = p.stiction[joint] * exp(-share * share)
+        friction = where(sticks, friction + more, friction)
     return friction
 
 
 @inlined
-def transmitted(p: Record, joint: int, twist: float, rate: float) -> float:
-    """Return the torque of an elastic transmission with a dead band."""
-    half = p.half_backlash[joint]
-    beyond = twist - min(max(twist, -half), half)
-    return p.belt_stiffness[joint] * beyond + p.belt_damping[joint] * rate
-
-
-@inlined
 def through_transmission(
-    p: Record, joint: int, torque: float, loss: float, q: float, v: float, t: float, w: float
-) -> tuple[float, float, float]:
+    p: Record, joint: int, torque: Number, loss: Number, q: Number, v: Number, t: Number, w: Number
+) -> Vector:
     """Return the torque on a link, the dry friction that holds it, and its rotor's acceleration.
 
     A rigid link (q, v) is its rotor (t, w), too: torque, damping and friction are its own.
     """
-    if p.elastic[joint] == 0:
-        return torque - p.damping[joint] * v, loss, 0.0
-    link = transmitted(p, joint, t - q, w - v)
-    pull, rest = torque - p.damping[joint] * w - link, -p.friction_damping * w
-    stiff = p.friction_stiffness[joint]
-    return link, 0.0, rotor_acceleration(p.armature[joint], pull, rest, loss, stiff)
+    force, rotor, elastic = torque - p.damping[joint] * v, spread(0.0, v), p.elastic[joint] > 0.0
+    if any_of(elastic):
+        half, twist = p.half_backlash[joint], t - q
+        beyond = twist - min(max(twist, -half), half)
+        link = p.belt_stiffness[joint] * beyond + p.belt_damping[joint] * (w - v)
+        pull, rest = torque - p.damping[joint] * w - link, -p.friction_damping * w
+        stiff = p.friction_stiffness[joint]
+        rotor = physics.rotor_acceleration(p.armature[joint], pull, rest, loss, stiff)
+        force, loss, rotor = where(elastic, link, force), where(elastic, 0.0, loss), rotor
+    return force, loss, where(elastic, rotor, 0.0)
 
 
 @inlined
-def implicit_damping(p: Record, joint: int, relief: float, dt: float) -> tuple[float, float, float]:
+def implicit_damping(p: Record, joint: int, relief: Number, dt: float) -> Vector:
     """Return what damping that is implicit in the new velocity adds to a link's inertia.
 
     Of an elastic joint (link l, rotor r, belt's damping c, armature A) the rows are
@@ -222,66 +226,79 @@ def implicit_damping(p: Record, joint: int, relief: float, dt: float) -> tuple[f
     from which y_r is eliminated; the other two numbers are dt c and its factor's inverse, zero for
     a rigid joint. ``relief`` is damping of the drive's own PD.
     """
-    drag = dt * (p.damping[joint] + relief)
-    if p.elastic[joint] == 0:
-        return drag, 0.0, 0.0
-    tie = dt * p.belt_damping[joint]
-    ease = 1 / (p.armature[joint] + drag + tie)
-    return tie - tie * tie * ease, tie, ease
+    drag, tie, ease = dt * (p.damping[joint] + relief), spread(0.0, relief), spread(0.0, relief)
+    elastic = p.elastic[joint] > 0.0
+    if any_of(elastic):
+        tie = where(elastic, dt * p.belt_damping[joint], 0.0)
+        ease = where(elastic, 1.0 / (p.armature[joint] + drag + tie), 0.0)
+        drag = where(elastic, tie - tie * tie * ease, drag)
+    return drag, tie, ease
+
+
+@inlined
+def with_rotor(
+    elastic: bool, gain: Number, dt: float, t: Number, w: Number, q: Number, v: Number
+) -> tuple[Number, Number]:
+    """Return the rotor's new angle and speed, of a rigid joint (q, v)."""
+    w = where(elastic, w + dt * gain, v)
+    return where(elastic, t + dt * w, q), w
 
 
 @inlined
 def advance(
-    p: Record,
-    state: Array,
-    memory: Record,
-    past: Array,
-    rows: Array,
-    push: float,
-    steps: int,
-    dt: float,
-    forward: bool,
-) -> None:
-    """Advance one leg by physics steps.
+    p: Record, state: Array, memory: Record, records: Records, past: Array, scratch: Array,
+    push: Number, steps: int, dt: float,
+) -> None:  # fmt: skip
+    """Advance one leg, or lanes, by physics steps.
 
     Args:
-        p: The leg's row of the table.
+        p: The leg's row of the table, or rows side by side.
         state: (x, q1, q2) of the links and their rates, (6,).
-        memory: The leg's ``MEMORY``.
-        past: Ring of what the sensors saw, (k, 6); empty if nothing needs it.
-        rows: Scratch for constraints, ``SCRATCH``.
+        memory: The leg's ``MEMORY`` but commands, or ``MEMORY`` side by side.
+        records: The ``MEMORY`` of each leg, (n,).
+        past: Rings of what the sensors saw, (n, k, 6); empty if nothing needs it.
+        scratch: ``SCRATCH`` numbers, of each.
         push: Upward force on the base, N.
         steps: How many.
         dt: Physics step, s.
-        forward: Whether it is on a boom and moves forward, or on the rail.
     """
+    rows, inbox = side_by_side(scratch, ROW), side_by_side(scratch[_CONSTRAINTS:], _INBOX)
+    columns = scratch[_CONSTRAINTS:].reshape(SCRATCH - _CONSTRAINTS, len(records))
+    for k in range(len(records)):
+        open_inbox(records[k], columns, k)
+    zero, one = spread(0.0, push), spread(1.0, push)
     x, q1, q2, v0, v1, v2 = state[0], state[1], state[2], state[3], state[4], state[5]
     t1, t2, w1, w2 = memory.rotor[0], memory.rotor[1], memory.rotor[2], memory.rotor[3]
-    a = (memory.acceleration[0], memory.acceleration[1], memory.acceleration[2], 0.0)
-    drift, moving = 0.0, ((0.0, 0.0, 0.0), 1.0, 0.0)
-    if forward:
-        drift = memory.forward
-        a = (a[0], a[1], a[2], memory.acceleration[3])
+    on_boom, a = p.boom_radius > 0.0, memory.acceleration
+    a = (a[0], a[1], a[2], where(on_boom, a[3], 0.0))
+    drift, boom = where(on_boom, memory.forward, 0.0), any_of(on_boom)
+    radius, moving = where(on_boom, p.boom_radius, 1.0), ((zero, zero, zero), one, zero, boom)
     hip, knee = memory.motor_torque[0], memory.motor_torque[1]
-    elastic1, elastic2 = p.elastic[0] > 0, p.elastic[1] > 0
-    fixed = p.fixed_base > 0
+    elastic1, elastic2 = p.elastic[0] > 0.0, p.elastic[1] > 0.0
+    fixed = p.fixed_base > 0.0
     armature1, armature2 = p.armature[0], p.armature[1]
     stiff = (p.rail_friction_stiffness, p.friction_stiffness[0], p.friction_stiffness[1])
-    soft = (1 / stiff[0], 1 / stiff[1], 1 / stiff[2])
-    rail = 0.0 if fixed else p.rail_friction
-    rail_drag = 0.0 if fixed else dt * p.rail_damping
-    mean1 = mean2 = square1 = square2 = power1 = power2 = 0.0
-    least, peak1, peak2, stop = np.inf, 0.0, 0.0, 0.0
-    if not elastic1:
-        t1, w1 = q1, v1
-    if not elastic2:
-        t2, w2 = q2, v2
+    soft = (1.0 / stiff[0], 1.0 / stiff[1], 1.0 / stiff[2])
+    rail = where(fixed, 0.0, p.rail_friction)
+    rail_drag = where(fixed, 0.0, dt * p.rail_damping)
+    mean1 = mean2 = square1 = square2 = power1 = power2 = peak1 = peak2 = stop = zero
+    least = spread(np.inf, push)
+    t1, w1 = where(elastic1, t1, q1), where(elastic1, w1, v1)
+    t2, w2 = where(elastic2, t2, q2), where(elastic2, w2, v2)
     for step in range(steps):
         # The drives: torques of motors and gears, dry friction.
-        asked1, asked2, in_force = receive(memory, step * dt, dt, t1, w1, t2, w2)
+        asked1, asked2 = asked(inbox.command, 0, t1, w1), asked(inbox.command, 1, t2, w2)
+        arrives = inbox.due < step * dt + dt
+        if any_of(arrives):
+            inbox.motors[0], inbox.motors[1], inbox.motors[2], inbox.motors[3] = t1, t2, w1, w2
+            for k in range(len(records)):
+                if columns[_DUE, k] < step * dt + dt:
+                    receive(records[k], columns, k, step * dt, dt)
+            asked1 = where(arrives, inbox.asked[0], asked1)
+            asked2 = where(arrives, inbox.asked[1], asked2)
         hip, response1 = motor_torque(p, 0, asked1, hip, w1)
         knee, response2 = motor_torque(p, 1, asked2, knee, w2)
-        relief1, relief2 = response1 * memory.command[6], response2 * memory.command[7]
+        relief1, relief2 = response1 * inbox.command[6], response2 * inbox.command[7]
         loss1, loss2 = dry_friction(p, 0, hip, w1), dry_friction(p, 1, knee, w2)
         force1, loss1, rotor1 = through_transmission(
             p, 0, after_gear(p, 0, hip, t1, w1), loss1, q1, v1, t1, w1
@@ -291,8 +308,9 @@ def advance(
         )
 
         # Mass matrix M and forces f - b.
-        s1, c1, s12, c12 = math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2)
-        m = mass_matrix(p, s1, s12, c1 * c12 + s1 * s12)
+        s1, c1 = sincos(q1)
+        s12, c12 = sincos(q1 + q2)
+        m = physics.mass_matrix(p, s1, s12, c1 * c12 + s1 * s12)
         bend = p.coupling * (s12 * c1 - c12 * s1)
         v12 = v1 + v2
         swing = p.thigh_moment * c1 * v1 * v1 + p.shank_moment * c12 * v12 * v12
@@ -300,60 +318,55 @@ def advance(
         force1 += bend * v2 * (v1 + v12) - p.gravity * m[1]
         force2 -= bend * v1 * v1 + p.gravity * m[2]
 
-        if forward:  # the boom's arc makes it heavier away from its pivot's height
-            lean = (x - p.boom_pivot) / p.boom_radius
-            level = 1 - lean * lean
-            force0 -= p.mass * lean / (p.boom_radius * level * level) * v0 * v0
+        if boom:  # its arc makes it heavier away from its pivot's height
+            lean = where(on_boom, (x - p.boom_pivot) / radius, 0.0)
+            level = 1.0 - lean * lean
+            force0 -= p.mass * lean / (radius * level * level) * v0 * v0
             m = (p.mass / level, m[1], m[2], m[3], m[4], m[5])
-            fold = p.shank_moment * c12
-            swing = p.thigh_moment * s1 * v1 * v1 + p.shank_moment * s12 * v12 * v12
-            moving = ((0.0, p.thigh_moment * c1 + fold, fold), p.forward_mass, swing)
+            thigh = where(on_boom, p.thigh_moment, 0.0)
+            shank = where(on_boom, p.shank_moment, 0.0)
+            tie, fold = where(on_boom, p.forward_mass, 1.0), shank * c12
+            swing = thigh * s1 * v1 * v1 + shank * s12 * v12 * v12
+            moving = ((zero, thigh * c1 + fold, fold), tie, swing, boom)
 
         # Constraints, and the acceleration under them.
-        speed = (v0, v1, v2)
-        touching = 0
-        if fixed:
-            m = (1.0, 0.0, 0.0, m[3], m[4], m[5])
-            force0 = 0.0
-        else:
-            touching = add_contacts(p, rows, x, speed, s1, c1, s12, c12, drift)
-        count = add_stops(p, rows, touching, (x, q1, q2), speed)
-        if count > touching:
-            stop = 1.0
+        speed, height = (v0, v1, v2), x
+        if any_of(fixed):
+            m0, m1, m2 = where(fixed, 1.0, m[0]), where(fixed, 0.0, m[1]), where(fixed, 0.0, m[2])
+            m = (m0, m1, m2, m[3], m[4], m[5])
+            force0, height = where(fixed, 0.0, force0), where(fixed, _ALOFT, x)
+        count = physics.add_contacts(p, rows, height, speed, s1, c1, s12, c12, drift)
+        count, stop1 = physics.add_stop(p, rows, count, 0, q1, v1)
+        count, stop2 = physics.add_stop(p, rows, count, 1, q2, v2)
         b = -p.friction_damping
         loss = (rail, loss1, loss2)
         bound = (rail * soft[0], loss1 * soft[1], loss2 * soft[2])
-        friction = (loss, stiff, (b * v0, b * v1, b * v2), bound)
+        hold = (
+            where(rail > 0.0, stiff[0], 0.0), where(loss1 > 0.0, stiff[1], 0.0),
+            where(loss2 > 0.0, stiff[2], 0.0),
+        )  # fmt: skip
+        friction = (loss, hold, (b * v0, b * v1, b * v2), bound)
         force = (force0, force1, force2)
-        a = constrained_acceleration(m, force, moving, friction, rows, count, a, forward)
+        a = physics.constrained_acceleration(m, force, moving, friction, rows, count, a)
 
         # The new velocity, in which damping is implicit, and the position that follows it.
-        f0, f1, f2 = times(m, (a[0], a[1], a[2]))
+        f0, f1, f2 = physics.times(m, (a[0], a[1], a[2]))
         drag1, tie1, ease1 = implicit_damping(p, 0, relief1, dt)
         drag2, tie2, ease2 = implicit_damping(p, 1, relief2, dt)
         f1 += tie1 * ease1 * armature1 * rotor1
         f2 += tie2 * ease2 * armature2 * rotor2
         damped = (m[0] + rail_drag, m[1], m[2], m[3] + drag1, m[4], m[5] + drag2)
-        if forward:
-            c, mass, _ = moving
-            f1, f2 = f1 + c[1] * a[3], f2 + c[2] * a[3]
-            pull = c[1] * a[1] + c[2] * a[2] + mass * a[3]
-            y0, y1, y2, y3 = solve_forward(damped, c, mass, (f0, f1, f2), pull)
-            drift += dt * y3
-        else:
-            y0, y1, y2 = solve(damped, (f0, f1, f2))
+        c, mass, _, _ = moving
+        f1, f2 = f1 + c[1] * a[3], f2 + c[2] * a[3]
+        pull = c[1] * a[1] + c[2] * a[2] + mass * a[3]
+        y0, y1, y2, y3 = physics.solve_all(damped, c, mass, (f0, f1, f2), pull, boom)
+        drift += dt * y3
         v0, v1, v2 = v0 + dt * y0, v1 + dt * y1, v2 + dt * y2
         x, q1, q2 = x + dt * v0, q1 + dt * v1, q2 + dt * v2
-        if elastic1:
-            w1 += dt * ease1 * (armature1 * rotor1 + tie1 * y1)
-            t1 += dt * w1
-        else:
-            t1, w1 = q1, v1
-        if elastic2:
-            w2 += dt * ease2 * (armature2 * rotor2 + tie2 * y2)
-            t2 += dt * w2
-        else:
-            t2, w2 = q2, v2
+        gain1 = ease1 * (armature1 * rotor1 + tie1 * y1)
+        gain2 = ease2 * (armature2 * rotor2 + tie2 * y2)
+        t1, w1 = with_rotor(elastic1, gain1, dt, t1, w1, q1, v1)
+        t2, w2 = with_rotor(elastic2, gain2, dt, t2, w2, q2, v2)
 
         # What it was for the motors, and what their sensors see.
         mean1, mean2 = mean1 + hip, mean2 + knee
@@ -361,23 +374,28 @@ def advance(
         power1, power2 = power1 + hip * w1, power2 + knee * w2
         least = min(least, hip * w1 + knee * w2)
         peak1, peak2 = max(peak1, abs(v1)), max(peak2, abs(v2))
-        if in_force < 1:
-            hip = after_arrival(p, memory.command, 0, hip, t1, w1)
-            knee = after_arrival(p, memory.command, 1, knee, t2, w2)
-        if len(past):
-            slot = int(memory.newest) + 1
-            if slot == len(past):
-                slot = 0
-            memory.newest = slot
-            seen = past[slot]
-            seen[0], seen[1], seen[2], seen[3], seen[4], seen[5] = t1, t2, w1, w2, hip, knee
-    for k in range(int(memory.waiting)):
-        memory.pending[k, 0] -= steps * dt
+        stop = max(stop, max(stop1, stop2))
+        if any_of(arrives):
+            in_force = where(arrives, inbox.in_force, 1.0)
+            hip = after_arrival(p, inbox.command, 0, in_force, hip, t1, w1)
+            knee = after_arrival(p, inbox.command, 1, in_force, knee, t2, w2)
+        if past.shape[1]:
+            inbox.motors[0], inbox.motors[1], inbox.motors[2] = t1, t2, w1
+            inbox.motors[3], inbox.motors[4], inbox.motors[5] = w2, hip, knee
+            for k in range(len(records)):
+                slot = int(records[k].newest) + 1
+                if slot == past.shape[1]:
+                    slot = 0
+                records[k].newest = slot
+                for i in range(6):
+                    past[k, slot, i] = columns[_MOTORS + i, k]
+    for k in range(len(records)):
+        for i in range(int(records[k].waiting)):
+            records[k].pending[i, 0] -= steps * dt
     state[0], state[1], state[2], state[3], state[4], state[5] = x, q1, q2, v0, v1, v2
     memory.rotor[0], memory.rotor[1], memory.rotor[2], memory.rotor[3] = t1, t2, w1, w2
-    memory.acceleration[0], memory.acceleration[1], memory.acceleration[2] = a[0], a[1], a[2]
-    if forward:
-        memory.forward, memory.acceleration[3] = drift, a[3]
+    memory.acceleration[0], memory.acceleration[1] = a[0], a[1]
+    memory.acceleration[2], memory.acceleration[3], memory.forward = a[2], a[3], drift
     memory.motor_torque[0], memory.motor_torque[1] = hip, knee
     memory.mean_torque[0], memory.mean_torque[1] = mean1 / steps, mean2 / steps
     loads = memory.loads
@@ -388,60 +406,55 @@ def advance(
 
 @compiled
 def step_leg(
-    p: Record,
-    state: Array,
-    memory: Record,
-    past: Array,
-    rows: Array,
-    push: float,
-    steps: int,
+    p: Record, state: Array, leg: Records, past: Array, scratch: Array, push: float, steps: int,
     dt: float,
-) -> None:
-    """Advance one leg on its rail, see ``advance``."""
-    advance(p, state, memory, past, rows, push, steps, dt, False)
-
-
-@compiled
-def step_leg_on_boom(
-    p: Record,
-    state: Array,
-    memory: Record,
-    past: Array,
-    rows: Array,
-    push: float,
-    steps: int,
-    dt: float,
-) -> None:
-    """Advance one leg on its boom, see ``advance``."""
-    advance(p, state, memory, past, rows, push, steps, dt, True)
+) -> None:  # fmt: skip
+    """Advance one leg, see ``advance``; its ``MEMORY`` is (1,), ``past`` is (k, 6)."""
+    ring = past.reshape(1, past.shape[0], 6)
+    advance(p, state, leg[0], leg, ring, scratch, push, steps, dt)
 
 
 @compiled
 def step_legs(
-    table: Records,
-    state: Array,
-    memory: Records,
-    past: Array,
-    command: Array,
-    jitter: Array,
-    push: Array,
-    first: int,
-    last: int,
-    steps: int,
-    dt: float,
-) -> None:
+    table: Records, state: Array, memory: Records, past: Array, command: Array, jitter: Array,
+    push: Array, first: int, last: int, steps: int, dt: float,
+) -> None:  # fmt: skip
     """Send commands to the legs from ``first`` to before ``last`` and advance these.
 
     Commands are (n, ``COMMAND``); ``jitter`` is the share of it, [0, 1), (n,).
     """
-    rows = np.empty(SCRATCH)
     for k in range(first, last):
-        p, leg = table[k], memory[k]
-        send(leg, command[k], p.command_latency + jitter[k] * p.command_jitter)
-        if p.boom_radius > 0:
-            step_leg_on_boom(p, state[k], leg, past[k], rows, push[k], steps, dt)
-        else:
-            step_leg(p, state[k], leg, past[k], rows, push[k], steps, dt)
+        p = table[k]
+        send(memory[k], command[k], p.command_latency + jitter[k] * p.command_jitter)
+    # Numbers of lanes, aligned: rows of the table, memory, state and push, scratch.
+    flat = np.empty((_OF_SCRATCH + SCRATCH + 1) * WIDTH)
+    skip = -(flat.ctypes.data // 8) % WIDTH
+    space = flat[skip : len(flat) - WIDTH + skip].reshape(_OF_SCRATCH + SCRATCH, WIDTH)
+    motion = side_by_side(space[_OF_STATE:], _MOTION)
+    fixed = table.view(np.float64).reshape(len(table), _OF_MEMORY)
+    kept = memory.view(np.float64).reshape(len(table), _OF_STATE - _OF_MEMORY)
+    whole = last - (last - first) % WIDTH
+    for k in range(first, whole, WIDTH):
+        for lane in range(WIDTH):
+            for i in range(_OF_MEMORY):
+                space[i, lane] = fixed[k + lane, i]
+            for i in range(_CHANGING):
+                space[_OF_MEMORY + i, lane] = kept[k + lane, i]
+            for i in range(6):
+                space[_OF_STATE + i, lane] = state[k + lane, i]
+            space[_OF_STATE + 6, lane] = push[k + lane]
+        wide, own = side_by_side(space, LEG), side_by_side(space[_OF_MEMORY:], MEMORY)
+        these, rings, scratch = memory[k : k + WIDTH], past[k : k + WIDTH], space[_OF_SCRATCH:]
+        advance(wide, motion.state, own, these, rings, scratch, motion.push, steps, dt)
+        for lane in range(WIDTH):
+            for i in range(_CHANGING):
+                kept[k + lane, i] = space[_OF_MEMORY + i, lane]
+            for i in range(6):
+                state[k + lane, i] = space[_OF_STATE + i, lane]
+    alone = np.empty(SCRATCH)
+    for k in range(whole, last):
+        leg = memory[k : k + 1]
+        step_leg(table[k], state[k], leg, past[k], alone, push[k], steps, dt)
 
 
 @compiled

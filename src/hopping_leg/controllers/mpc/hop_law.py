@@ -14,8 +14,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, IntArray, Record, Records
 from hopping_leg.sim.compiled import compiled, inlined
-from hopping_leg.sim.leg_physics import SCRATCH
-from hopping_leg.sim.stepper import COMMAND, copy_memory, send, step_leg
+from hopping_leg.sim.stepper import COMMAND, SCRATCH, send, step_leg
 
 FLIGHT, LANDING, PUSH = 0, 1, 2
 """Phases: in the air, on the ground before and after the leg stops to shorten."""
@@ -139,7 +138,7 @@ def law(p: Record, shape: Record, state: Array, hop: Record, phase: int, torque:
 
 @inlined
 def begin_plan(
-    p: Record, state: Array, memory: Record, past: Array, rows: Array, here: Array, plan: Record,
+    p: Record, state: Array, memory: Record, past: Array, rows: Array, here: Array, plan: Records,
     steps: int, dt: float,
 ) -> float:  # fmt: skip
     """Set ``here`` and ``plan`` to a leg when the next command arrives, but for what remains.
@@ -149,7 +148,7 @@ def begin_plan(
     """
     for i in range(6):
         here[i] = state[i]
-    copy_memory(memory, plan)
+    plan[0] = memory
     whole = int(p.command_latency / (steps * dt) + 1e-9)
     if whole > 0:
         step_leg(p, here, plan, past, rows, 0.0, whole * steps, dt)
@@ -166,7 +165,7 @@ def last_command(memory: Record, torque: Array) -> None:
 
 @inlined
 def apex_of(
-    ground: Record, air: Record, shape: Record, state: Array, memory: Record, past: Array,
+    ground: Record, air: Record, shape: Record, state: Array, memory: Records, past: Array,
     rows: Array, hop: Record, torque: Array, command: Array, late: float, steps: int, dt: float,
     air_steps: int, air_dt: float, ticks: int,
 ) -> float:  # fmt: skip
@@ -179,7 +178,7 @@ def apex_of(
         phase = next_phase(ground, state, hop, phase)
         law(ground, shape, state, hop, phase, torque)
         command[0], command[1] = torque[0], torque[1]
-        send(memory, command, late)
+        send(memory[0], command, late)
         height, rate = state[0], state[3]
         if phase == FLIGHT:
             flown += 1
@@ -211,7 +210,8 @@ def act(
     """
     rows, past = np.empty(SCRATCH), np.empty((0, 6))
     command, here, there, torque = np.zeros(COMMAND), np.empty(6), np.empty(6), np.empty(2)
-    begun, plan, shape = scratch[2 * first], scratch[2 * first + 1], shapes[0]
+    begun, plan = scratch[2 * first : 2 * first + 1], scratch[2 * first + 1 : 2 * first + 2]
+    shape = shapes[0]
     for k in range(first, last):
         p, hop, dt = ground[k], hops[k], period / steps[k]
         late = begin_plan(p, state[k], memory[k], past, rows, here, begun, steps[k], dt)
@@ -235,7 +235,7 @@ def act(
                 there[i] = here[i]
             for i in range(2):
                 torque[i] = torques[k, i]
-            copy_memory(begun, plan)
+            plan[0] = begun[0]
             apex = apex_of(
                 p, air[k], shape, there, plan, past, rows, hop, torque, command, late, steps[k], dt,
                 air_steps, period / air_steps, ticks,
