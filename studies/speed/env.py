@@ -6,7 +6,7 @@ thread, for the plain leg, and the stepper with every effect of the twin. All si
 motion, so that their ratios are what physics, noise, delay, reward and observation cost.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import gymnasium
@@ -17,7 +17,7 @@ from mujoco import batch
 from hopping_leg.arrays import Array
 from hopping_leg.cli.options import JsonFile, RobotFile, at_least
 from hopping_leg.envs import HoppingEnv, HoppingTask, TaskConfig, paper_reward
-from hopping_leg.robot import COARSE_TIMESTEP, DEFAULT_ROBOT, build_model, load_robot
+from hopping_leg.robot import COARSE_TIMESTEP, DEFAULT_ROBOT, TIMESTEP, build_model, load_robot
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.sim import LegSimulator
 from studies.shared import Row, Timed, host, interleave, show_numbers
@@ -48,7 +48,7 @@ class Env:
     threads: int = 0
     """Of the batched environment and the batched physics alike, 0 for one per core."""
     timestep: float = COARSE_TIMESTEP
-    """Physics step, s."""
+    """Physics step, s; the batched environment is also timed at the converged one."""
     seed: int = 0
     """Of noise and delay."""
     json: JsonFile = None
@@ -76,6 +76,7 @@ class Env:
             "stepper_over_mujoco": ratio("mujoco_batch", "stepper"),
             "stepper_with_effects_over_mujoco": ratio("mujoco_batch", "stepper_with_effects"),
             "batched_env_steps_per_s": 1 / typical["batched_env"],
+            "batched_env_steps_per_s_converged": 1 / typical["batched_env_converged"],
             "batched_env_overhead_s": float(
                 np.median(taken["batched_env"] - taken["batched_physics"])
             ),
@@ -88,6 +89,7 @@ class Env:
                 "threads": self.threads,
                 "repeats": self.repeats,
                 "timestep_s": self.timestep,
+                "converged_timestep_s": TIMESTEP,
                 "substeps": substeps,
                 "noise_and_delay": True,
             },
@@ -101,8 +103,11 @@ class Env:
         robot, rng = load_robot(self.robot), np.random.default_rng(self.seed)
         hip, knee = robot.of_joints("torque_limit").tolist()
         options = TaskConfig(action_torque=(hip, knee), timestep=self.timestep, episode=3600.0)
-        task = HoppingTask(robot, self.count, options, paper_reward(robot), rng, self.threads)
-        many = record(task, self.ticks)
+        task, fine = (
+            HoppingTask(robot, self.count, each, paper_reward(robot), rng, self.threads)
+            for each in (options, replace(options, timestep=TIMESTEP))
+        )
+        many, many_fine = record(task, self.ticks), record(fine, self.ticks)
         env = HoppingEnv(robot, options)
         env.reset(seed=self.seed)
         one = record(env.task, self.single_ticks)
@@ -116,6 +121,7 @@ class Env:
         hopper.reset(seed=self.seed)
         return {
             "batched_env": lambda: _run_task(task, many),
+            "batched_env_converged": lambda: _run_task(fine, many_fine),
             "batched_physics": lambda: _run_legs(bare, many),
             "stepper": lambda: _run_legs(plain, many),
             "stepper_with_effects": lambda: _run_legs(twin, many),

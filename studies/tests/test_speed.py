@@ -45,11 +45,13 @@ def test_every_promised_number_of_the_environment_is_there(tmp_path):
     pytest.importorskip("imageio")
     words = ["--count", "8", "--ticks", "5", "--single-ticks", "5", "--repeats", "2"]
     result = measured(tmp_path, Env, *words)
-    rates = ("batched_env_steps_per_s", "batched_env_over_hopper_v5", "single_env_over_hopper_v5")
+    batched = ("batched_env_steps_per_s", "batched_env_steps_per_s_converged")
+    rates = (*batched, "batched_env_over_hopper_v5", "single_env_over_hopper_v5")
     steps = ("single_env", "stepper", "stepper_with_effects", "mujoco_batch")
     ratios = ("stepper_over_mujoco", "stepper_with_effects_over_mujoco")
     assert all(result[name] > 0 for name in (*rates, *ratios, *(f"{s}_step_s" for s in steps)))
     assert result["setup"]["substeps"] == 10
+    assert result["setup"]["converged_timestep_s"] == 1.25e-4
     assert {"batched_env_overhead_s", "host", "command"} <= result.keys()
 
 
