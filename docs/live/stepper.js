@@ -21,8 +21,7 @@ export class Stepper {
     };
     const all = BEGIN + Object.values(sizes).reduce((sum, size) => sum + size);
     const memory = new WebAssembly.Memory({ initial: Math.ceil(BYTES * all / PAGE) });
-    const { sin, cos, exp } = Math;
-    const imports = { env: { __linear_memory: memory, sin, cos, exp } };
+    const imports = { env: { __linear_memory: memory } };
     this.compiled = new WebAssembly.Instance(module, imports).exports;
     let next = BEGIN;
     for (const [name, size] of Object.entries(sizes)) {

@@ -247,7 +247,7 @@ def with_rotor(
 @inlined
 def advance(
     p: Record, state: Array, memory: Record, records: Records, past: Array, scratch: Array,
-    push: Number, steps: int, dt: float,
+    columns: Array, push: Number, steps: int, dt: float,
 ) -> None:  # fmt: skip
     """Advance one leg, or lanes, by physics steps.
 
@@ -258,12 +258,12 @@ def advance(
         records: The ``MEMORY`` of each leg, (n,).
         past: Rings of what the sensors saw, (n, k, 6); empty if nothing needs it.
         scratch: ``SCRATCH`` numbers, of each.
+        columns: Those behind the constraints, a column for each leg.
         push: Upward force on the base, N.
         steps: How many.
         dt: Physics step, s.
     """
     rows, inbox = side_by_side(scratch, ROW), side_by_side(scratch[_CONSTRAINTS:], _INBOX)
-    columns = scratch[_CONSTRAINTS:].reshape(SCRATCH - _CONSTRAINTS, len(records))
     for k in range(len(records)):
         open_inbox(records[k], columns, k)
     zero, one = spread(0.0, push), spread(1.0, push)
@@ -410,8 +410,8 @@ def step_leg(
     dt: float,
 ) -> None:  # fmt: skip
     """Advance one leg, see ``advance``; its ``MEMORY`` is (1,), ``past`` is (k, 6)."""
-    ring = past.reshape(1, past.shape[0], 6)
-    advance(p, state, leg[0], leg, ring, scratch, push, steps, dt)
+    columns = scratch[_CONSTRAINTS:, np.newaxis]
+    advance(p, state, leg[0], leg, past[np.newaxis], scratch, columns, push, steps, dt)
 
 
 @compiled
@@ -445,7 +445,8 @@ def step_legs(
             space[_OF_STATE + 6, lane] = push[k + lane]
         wide, own = side_by_side(space, LEG), side_by_side(space[_OF_MEMORY:], MEMORY)
         these, rings, scratch = memory[k : k + WIDTH], past[k : k + WIDTH], space[_OF_SCRATCH:]
-        advance(wide, motion.state, own, these, rings, scratch, motion.push, steps, dt)
+        columns, push_of = scratch[_CONSTRAINTS:], motion.push
+        advance(wide, motion.state, own, these, rings, scratch, columns, push_of, steps, dt)
         for lane in range(WIDTH):
             for i in range(_CHANGING):
                 kept[k + lane, i] = space[_OF_MEMORY + i, lane]
