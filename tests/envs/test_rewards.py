@@ -31,6 +31,8 @@ def squared_action(transition):
 class Patience(LastingTerm):
     """Counts the ticks of an episode."""
 
+    STATE = ("ticks",)
+
     def __init__(self):
         self.ticks = np.zeros(3)
 
@@ -40,12 +42,6 @@ class Patience(LastingTerm):
 
     def restart(self, rows):
         self.ticks[rows] = 0
-
-    def state(self):
-        return {"ticks": self.ticks.copy()}
-
-    def restore(self, state):
-        self.ticks = state["ticks"].copy()
 
 
 def make_task(*terms, episode=0.05, seed=0):

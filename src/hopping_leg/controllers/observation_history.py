@@ -6,11 +6,11 @@ policy's graph, so that a policy file needs nothing but encoders and a command.
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from hopping_leg.arrays import Array, Array32, IntArray
+from hopping_leg.arrays import Array, Array32, IntArray, Stateful
 from hopping_leg.controllers import robot_numbers
 from hopping_leg.controllers.sample_history import SampleHistory
 from hopping_leg.errors import PolicyError, UsageError, unknown_name
@@ -23,7 +23,7 @@ FULL_TORQUE = "full_torque"
 Inputs = dict[str, Array32]  # Graph input to its array, (n, ...)
 
 
-class ObservationHistory(ABC):
+class ObservationHistory(Stateful, ABC):
     """Turns measurements into a policy's inputs; may remember past ticks of a period, s.
 
     One of your own needs a class and an entry in ``OBSERVATION_HISTORIES``.
@@ -42,10 +42,10 @@ class ObservationHistory(ABC):
         """Graph inputs that the network sees; the full torque scales what it gives."""
         return tuple(name for name in self.shapes if name != FULL_TORQUE)
 
-    def set_robots(self, robots: Sequence[Robot]) -> None:  # noqa: B027
+    def set_robots(self, robots: Sequence[Robot]) -> None:
         """Say what is believed of the legs: a robot each, or one of all."""
 
-    def reset(self, count: int) -> None:  # noqa: B027
+    def reset(self, count: int) -> None:
         """Forget the past of all legs; the next measurement has ``count`` rows."""
 
     @abstractmethod
@@ -59,13 +59,6 @@ class ObservationHistory(ABC):
     @abstractmethod
     def inputs(self) -> Inputs:
         """Return the graph's inputs at this tick."""
-
-    def state(self) -> dict[str, Any]:
-        """Return what is remembered from tick to tick, as arrays."""
-        return {}
-
-    def restore(self, state: dict[str, Any]) -> None:  # noqa: B027
-        """Go on from a ``state``."""
 
 
 class ThreeSamples(ObservationHistory):
@@ -121,6 +114,7 @@ class Dated(ObservationHistory):
     TORQUE_LAGS: ClassVar[tuple[int, ...]] = (0, 1, 2, 4, 6)
     """Ticks before the last action of the torques."""
     shapes: ClassVar[dict[str, tuple[int, ...]]] = _dated_shapes(LAGS, TORQUE_LAGS)
+    STATE = ("_track", "_torques", "_command", "_fresh")
 
     def __init__(self, period: float) -> None:
         super().__init__(period)
@@ -168,20 +162,6 @@ class Dated(ObservationHistory):
             "past_torque": self._torques[self._torque_lags].swapaxes(0, 1).astype(np.float32),
             "command": self._command[:, None].astype(np.float32),
         }
-
-    def state(self) -> dict[str, Any]:
-        """Return samples, torques and command."""
-        return {
-            "track": self._track.state(),
-            "torques": self._torques.copy(),
-            "command": self._command.copy(),
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on from a ``state``."""
-        self._track.restore(state["track"])
-        self._torques, self._command = np.array(state["torques"]), np.array(state["command"])
-        self._fresh = False
 
 
 class DatedLong(Dated):

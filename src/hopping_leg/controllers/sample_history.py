@@ -1,18 +1,18 @@
 """What was measured lately, newest first, with every late sample put where it belongs in time."""
 
-from typing import Any
-
 import numpy as np
 
-from hopping_leg.arrays import Array, IntArray
+from hopping_leg.arrays import Array, IntArray, Stateful
 from hopping_leg.sim.channel import Measurement
 
 
-class SampleHistory:
+class SampleHistory(Stateful):
     """Joint samples of n legs by tick, newest first; a measurement's ages tell their places.
 
     ``length`` is the number of ticks to remember, ``period`` that of control, s.
     """
+
+    STATE = ("known", "q", "qd")
 
     def __init__(self, length: int, period: float) -> None:
         self.length, self.period = length, period
@@ -54,15 +54,6 @@ class SampleHistory:
         for i in np.flatnonzero(unknown.any(axis=(1, 2)))[::-1]:
             for history in (self.q, self.qd):
                 np.copyto(history[i], history[i + 1], where=unknown[i])
-
-    def state(self) -> dict[str, Any]:
-        """Return everything remembered, as arrays."""
-        return {"known": self.known.copy(), "q": self.q.copy(), "qd": self.qd.copy()}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on from a ``state``."""
-        self.reset(state["known"].shape[1])
-        self.known[:], self.q[:], self.qd[:] = state["known"], state["q"], state["qd"]
 
 
 WINDOW = 11  # Ticks in which a late sample may still reach a ``DatedObserver``

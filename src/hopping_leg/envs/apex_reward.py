@@ -11,7 +11,6 @@ one keeps body and knee off the ground.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -132,6 +131,8 @@ class ApexEvent(LastingTerm):
     Widths are in m, the control period is in s.
     """
 
+    STATE = ("_air", "_since")
+
     def __init__(self, width: tuple[float, float], period: float) -> None:
         self._widths, self._period = width, period
         self._air = self._since = np.zeros(0)
@@ -162,14 +163,6 @@ class ApexEvent(LastingTerm):
         """Forget the past of some legs."""
         if len(self._air):
             self._air[rows], self._since[rows] = 0.0, _FULL_PERIOD
-
-    def state(self) -> dict[str, Any]:
-        """Return every leg's time in the air and since its last apex."""
-        return {"air": self._air.copy(), "since": self._since.copy()}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on from a ``state``."""
-        self._air, self._since = np.array(state["air"]), np.array(state["since"])
 
 
 def ballistic_apex(height: Array, rate: Array) -> Array:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hopping_leg.arrays import Array, Array32, BoolArray
+from hopping_leg.arrays import Array, Array32, BoolArray, Stateful
 from hopping_leg.controllers import robot_numbers
 from hopping_leg.robot import GRAVITY, Robot
 from hopping_leg.sim import LegSimulator
@@ -17,11 +17,13 @@ ERROR_GAIN = 16.0  # Of errors of hops, over the leg's length
 _MOST_ERROR = 0.3
 
 
-class HiddenState:
+class HiddenState(Stateful):
     """Height and contact, the last hop's error, and how the legs differ from what is told of them.
 
     ``size`` is how many numbers these are.
     """
+
+    STATE = ("error", "_flying")
 
     def __init__(self, legs: LegSimulator, believed: Sequence[Robot]) -> None:
         pairs = zip(believed, legs.robots, strict=True)
@@ -42,14 +44,6 @@ class HiddenState:
         landed = ~np.isnan(self._flying) & (self._legs.foot_clearance() <= 0)
         self.error[landed], self._flying[landed] = self._flying[landed], np.nan
         self.error[begun], self._flying[begun] = 0.0, np.nan
-
-    def state(self) -> dict[str, Array]:
-        """Return what is remembered from tick to tick."""
-        return {"error": self.error.copy(), "flying": self._flying.copy()}
-
-    def restore(self, state: dict[str, Array]) -> None:
-        """Go on from a ``state``."""
-        self.error[:], self._flying[:] = state["error"], state["flying"]
 
     def view(self) -> Array32:
         """Return the numbers now, (n, size)."""

@@ -9,11 +9,11 @@ scale, the command runs from -1 to 1 over its range.
 import itertools
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from hopping_leg.arrays import Array, Array32, IntArray
+from hopping_leg.arrays import Array, Array32, IntArray, Stateful
 from hopping_leg.controllers import observation_history
 from hopping_leg.envs.task_config import TaskConfig
 from hopping_leg.robot.parameters import Robot
@@ -36,7 +36,7 @@ class Scaling(NamedTuple):
     """Inverse scales of the same, (k,)."""
 
 
-class Observation:
+class Observation(Stateful):
     """The observations of n legs: the paper's, straight from the channel's samples.
 
     Attributes:
@@ -72,13 +72,6 @@ class Observation:
     def restart(self, rows: IntArray, samples: Array, channel: Channel) -> None:
         """Forget the past of some legs, which begin anew within this tick."""
 
-    def state(self) -> dict[str, Any]:
-        """Return what is remembered from tick to tick."""
-        return {}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on from a ``state``."""
-
 
 @compiled
 def _normalise(samples: Array, offset: Array, gain: Array, seen: Array32) -> None:
@@ -90,6 +83,8 @@ def _normalise(samples: Array, offset: Array, gain: Array, seen: Array32) -> Non
 
 class HistoryObservation(Observation):
     """The inputs of any policy layout, made by the very code that makes them on the robot."""
+
+    STATE = ("_history",)
 
     def __init__(
         self,
@@ -125,14 +120,6 @@ class HistoryObservation(Observation):
         seen = np.empty(self._joined.shape, np.float32)
         np.subtract(self._joined, self.scaling.offset, out=self._joined)
         return np.multiply(self._joined, self.scaling.gain, out=seen)
-
-    def state(self) -> dict[str, Any]:
-        """Return what the history remembers."""
-        return self._history.state()
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on from a ``state``."""
-        self._history.restore(state)
 
 
 def sample_scaling(robot: Robot, config: TaskConfig) -> Scaling:

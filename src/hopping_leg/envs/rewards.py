@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hopping_leg import errors, hop_detection
-from hopping_leg.arrays import Array, BoolArray, IntArray
+from hopping_leg.arrays import Array, BoolArray, IntArray, Stateful
 
 
 @dataclass
@@ -56,8 +56,8 @@ def sum_of_joints(values: Array) -> Array:
     return values[:, 0] + values[:, 1]
 
 
-class LastingTerm:
-    """A term that remembers something or changes in training; override what it needs."""
+class LastingTerm(Stateful):
+    """A term that remembers something, see ``STATE``, or changes in training."""
 
     def __call__(self, transition: Transition) -> Array | float:
         """Return the unweighted term, (n,), or one number for all."""
@@ -68,13 +68,6 @@ class LastingTerm:
 
     def anneal(self, share: float) -> None:
         """Adapt to the share of the training that is done, 0 to 1."""
-
-    def state(self) -> dict[str, Any]:
-        """Return what is remembered, as arrays and plain values."""
-        return {}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on from a ``state``."""
 
 
 class RewardTerm(NamedTuple):

@@ -2,7 +2,6 @@
 
 import copy
 import math
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, NoReturn
@@ -10,7 +9,7 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 
 from hopping_leg import errors, hop_detection
-from hopping_leg.arrays import Array, Array32, BoolArray, IntArray
+from hopping_leg.arrays import Array, Array32, BoolArray, IntArray, Stateful
 from hopping_leg.controllers import robot_numbers
 from hopping_leg.controllers.observation_history import AnyLeg
 from hopping_leg.envs import rewards, task_config
@@ -68,7 +67,7 @@ class Step(NamedTuple):
     """Desired height in force during the tick, m, (n,)."""
 
 
-class HoppingTask:
+class HoppingTask(Stateful):
     """n legs learning to hop; the only place where observation and reward are put together.
 
     All randomness comes from ``rng``; the threads, 0 for one per core, change no result. With
@@ -76,6 +75,11 @@ class HoppingTask:
     reward is copied: what it remembers is of this task's legs alone. Where ``legs`` are given, one
     for each environment, they differ: what is told of them, what they are, and what is asked.
     """
+
+    STATE = (
+        *("command", "last_action", "reward", "observation", "plant.channel", "_recent_errors"),
+        *("_tick", "_end", "_switch", "_rises", "_since_apex", "_rng", "_legs_seed"),
+    )
 
     def __init__(
         self,
@@ -117,7 +121,7 @@ class HoppingTask:
         self._switch = np.full(count, np.iinfo(np.int64).max)
         self.last_action, self._rises = np.zeros((count, 2)), np.zeros(count, np.bool_)
         self._since_apex = np.zeros(count)
-        self._recent_errors: deque[float] = deque(maxlen=_RECENT)
+        self._recent_errors: list[float] = []
         self.reset()
 
     def _take(self, robot: Robot, noise: np.random.Generator) -> None:
@@ -221,7 +225,7 @@ class HoppingTask:
         transition.apex, transition.apex_height = apex, height
         self._since_apex[apex] = 0.0
         error: Array = height - transition.command
-        self._recent_errors.extend(error[apex].tolist())
+        self._recent_errors = [*self._recent_errors, *error[apex].tolist()][-_RECENT:]
         return error
 
     def privileged(self) -> Array32:
@@ -251,39 +255,14 @@ class HoppingTask:
 
     def state(self) -> dict[str, Any]:
         """Return everything needed to go on exactly from here, as arrays and plain values."""
-        return {
-            "legs": self.legs.memory(),
-            "channel": self.plant.channel.state(),
-            "command": self.command.copy(),
-            "tick": self._tick,
-            "end": self._end.copy(),
-            "switch": self._switch.copy(),
-            "last_action": self.last_action.copy(),
-            "rises": self._rises.copy(),
-            "since_apex": self._since_apex.copy(),
-            "rng": self._rng.bit_generator.state,
-            "legs_seed": self._legs_seed,
-            "recent_errors": list(self._recent_errors),
-            "reward": self.reward.state(),
-            "observation": self.observation.state(),
-        }
+        return {**super().state(), "legs": self.legs.memory()}
 
     def restore(self, state: dict[str, Any]) -> Array32:
         """Go on from a ``state``; return the observations, (n, size)."""
-        if (seed := state.get("legs_seed", self._legs_seed)) != self._legs_seed:
-            self._randomize(seed)
+        if state["_legs_seed"] != self._legs_seed:
+            self._randomize(state["_legs_seed"])
+        super().restore(state)
         self.legs.restore(state["legs"])
-        self.plant.channel.restore(state["channel"])
-        self.command[:] = state["command"]
-        self._tick = int(state["tick"])
-        self._end[:] = state["end"]
-        self._switch[:] = state["switch"]
-        self.last_action, self._rises = np.array(state["last_action"]), np.array(state["rises"])
-        self._since_apex = np.array(state["since_apex"])
-        self._recent_errors = deque(state["recent_errors"], maxlen=_RECENT)
-        self._rng.bit_generator.state = state["rng"]
-        self.reward.restore(state["reward"])
-        self.observation.restore(state["observation"])
         self._plan()
         self._samples = self.plant.samples(self.command)
         return self.observation.view(self._samples)

@@ -16,7 +16,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.io import one_line, write_atomically
 
 Tree = dict[str, Any]
-"""Nested dictionaries and lists of arrays and plain values."""
+"""Nested dictionaries and lists of arrays, tensors and plain values."""
 
 KEPT = 2
 """Checkpoints kept in a run."""
@@ -29,7 +29,7 @@ def write_checkpoint(folder: Path, steps: int, tree: Tree) -> Path:
         TraceError: It cannot be written; nothing of it is left.
     """
     path, content = folder / f"checkpoint-{steps:012d}.pt", io.BytesIO()
-    torch.save(to_torch(tree), content)
+    torch.save(_stored(tree), content)
     write_atomically(path, content.getvalue())
     for old in list_checkpoints(folder)[:-KEPT]:
         old.unlink()
@@ -47,7 +47,7 @@ def read_checkpoint(path: Path) -> Tree:
         with zipfile.ZipFile(path) as file:
             if (damaged := file.testzip()) is not None:  # torch checks no sums
                 raise UsageError(f"the checksum of {damaged} does not fit")
-        tree: Tree = to_numpy(torch.load(path, weights_only=True))
+        tree: Tree = _as_it_was(torch.load(path, weights_only=True))
     except Exception as error:  # torch and zipfile raise many unrelated types
         raise UsageError(
             f"Checkpoint {path} is damaged ({one_line(error)}); delete it to resume from the one"
@@ -56,21 +56,21 @@ def read_checkpoint(path: Path) -> Tree:
     return tree
 
 
-def to_numpy(node: Any) -> Any:  # noqa: ANN401
-    """Return nested containers with arrays in the place of tensors."""
+def _stored(node: Any) -> Any:  # noqa: ANN401
+    """Return nested containers with arrays as tensors, each alone in a tuple."""
     if isinstance(node, dict):
-        return {key: to_numpy(value) for key, value in node.items()}
+        return {key: _stored(value) for key, value in node.items()}
     if isinstance(node, list | tuple):
-        return [to_numpy(value) for value in node]
-    return node.detach().numpy() if isinstance(node, torch.Tensor) else node
-
-
-def to_torch(node: Any) -> Any:  # noqa: ANN401
-    """Return nested containers with tensors in the place of arrays, whose memory they share."""
-    if isinstance(node, dict):
-        return {key: to_torch(value) for key, value in node.items()}
-    if isinstance(node, list | tuple):
-        return [to_torch(value) for value in node]
+        return [_stored(value) for value in node]
     if isinstance(node, np.generic):
         return node.item()
-    return torch.from_numpy(node) if isinstance(node, np.ndarray) else node
+    return (torch.from_numpy(node),) if isinstance(node, np.ndarray) else node
+
+
+def _as_it_was(node: Any) -> Any:  # noqa: ANN401
+    """Return nested containers with arrays in the place of tuples."""
+    if isinstance(node, dict):
+        return {key: _as_it_was(value) for key, value in node.items()}
+    if isinstance(node, list):
+        return [_as_it_was(value) for value in node]
+    return node[0].numpy() if isinstance(node, tuple) else node

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from stable_baselines3.common.logger import Logger
 
+from hopping_leg.arrays import Stateful
 from hopping_leg.envs.task import HoppingTask
 
 
@@ -18,7 +19,7 @@ class NetworkConfig:
     """Hidden layers of the critic."""
 
 
-class Learner:
+class Learner(Stateful):
     """Counts control steps, follows a budget and logs, with the names of stable-baselines3.
 
     Attributes:

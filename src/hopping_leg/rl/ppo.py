@@ -19,7 +19,6 @@ from stable_baselines3.common.torch_layers import create_mlp
 from torch import nn
 
 from hopping_leg.envs.task import HoppingTask
-from hopping_leg.rl.checkpoint import Tree, to_torch
 from hopping_leg.rl.learner import Learner, NetworkConfig
 from hopping_leg.rl.onnx_export import Actor, DenseActor
 
@@ -86,6 +85,11 @@ class PPO(Learner):
 
     Everything random follows from the seed; torch sums otherwise on another number of threads.
     """
+
+    STATE = (
+        *("actor", "critic", "optimizer", "task", "num_timesteps"),
+        *("_average", "_rate", "_draws", "_seen"),
+    )
 
     def __init__(
         self, task: HoppingTask, config: PPOConfig, network: NetworkConfig, seed: int
@@ -207,29 +211,6 @@ class PPO(Learner):
     def network(self) -> Actor:
         """Return the deterministic actor as it stands."""
         return DenseActor(*self._average)
-
-    def state(self) -> Tree:
-        """Return everything needed to continue exactly, environments included."""
-        return {
-            "actor": self.actor.state_dict(),
-            "average": self._average.state_dict(),
-            "critic": self.critic.state_dict(),
-            "optimizer": self.optimizer.state_dict(),
-            "rate": self._rate,
-            "task": self.task.state(),
-            "draws": self._draws.get_state().numpy(),
-            "steps": self.num_timesteps,
-        }
-
-    def restore(self, state: Tree) -> None:
-        """Go on from a ``state``."""
-        self.actor.load_state_dict(to_torch(state["actor"]))
-        self._average.load_state_dict(to_torch(state["average"]))
-        self.critic.load_state_dict(to_torch(state["critic"]))
-        self.optimizer.load_state_dict(to_torch(state["optimizer"]))
-        self._rate, self.num_timesteps = state["rate"], state["steps"]
-        self._seen = self.task.restore(state["task"])
-        self._draws.set_state(torch.from_numpy(state["draws"]))
 
 
 def _mlp(inputs: int, hidden: tuple[int, ...], outputs: int) -> nn.Sequential:

@@ -21,13 +21,13 @@ from stable_baselines3.sac.policies import Actor as SACActor
 from stable_baselines3.sac.policies import SACPolicy
 from torch import nn
 
+from hopping_leg.arrays import Stateful
 from hopping_leg.envs.task import HoppingTask
-from hopping_leg.rl.checkpoint import Tree, to_torch
+from hopping_leg.rl.checkpoint import Tree
 from hopping_leg.rl.learner import NetworkConfig
 from hopping_leg.rl.onnx_export import Actor, DenseActor
 from hopping_leg.rl.sb3_env import TaskVecEnv
 
-_COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_current_progress_remaining")
 _REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
@@ -111,8 +111,14 @@ class AsymmetricSACPolicy(SACPolicy):  # type: ignore[misc]
         return super().make_critic(_Columns(self.observation_space, slice(self._actor_size, None)))
 
 
-class ResumableSAC(SAC):  # type: ignore[misc]
+class ResumableSAC(Stateful, SAC):  # type: ignore[misc]
     """Soft actor-critic on a ``TaskVecEnv``; ``Learner`` has the same attributes."""
+
+    STATE = (
+        *("policy", "actor.optimizer", "critic.optimizer", "log_ent_coef", "ent_coef_optimizer"),
+        *("num_timesteps", "_episode_num", "_n_updates", "_current_progress_remaining"),
+        *("env", "_last_obs", "_last_episode_starts", "action_space.np_random"),
+    )
 
     on_boundary: Callable[[], None] | None = None
     remaining: Callable[[], float] | None = None
@@ -176,58 +182,20 @@ class ResumableSAC(SAC):  # type: ignore[misc]
         """Return everything needed to continue exactly, its environment included."""
         buffer = self.replay_buffer
         filled = buffer.buffer_size if buffer.full else buffer.pos
-        tree = {
-            "policy": self.policy.state_dict(),
-            "optimizers": [o.state_dict() for o in _optimizers(self)],
-            "counters": {name: getattr(self, name) for name in _COUNTERS},
-            "env": self.env.state(),
-            "last_observation": self._last_obs,
-            "last_episode_starts": self._last_episode_starts,
-            "random": _random_state(self),
-            "replay": {
-                "pos": buffer.pos,
-                "full": buffer.full,
-                "arrays": {name: getattr(buffer, name)[:filled] for name in _REPLAY},
-            },
+        return {
+            **super().state(),
+            "torch": torch.get_rng_state(),
+            "numpy": np.random.get_state(legacy=True),  # noqa: NPY002
+            "place": [buffer.pos, buffer.full],
+            "replay": {name: getattr(buffer, name)[:filled] for name in _REPLAY},
         }
-        if self.log_ent_coef is not None:
-            tree["log_ent_coef"] = self.log_ent_coef.detach().numpy().copy()
-        return tree
 
     def restore(self, state: Tree) -> None:
         """Bring a freshly built learner of the same recipe to a ``state``."""
-        self.env.restore(state["env"])
-        self.policy.load_state_dict(to_torch(state["policy"]))
-        if "log_ent_coef" in state:
-            self.log_ent_coef.data.copy_(torch.from_numpy(state["log_ent_coef"]))
-        for optimizer, tree in zip(_optimizers(self), state["optimizers"], strict=True):
-            optimizer.load_state_dict(to_torch(tree))
-        for name, value in state["counters"].items():
-            setattr(self, name, value)
-        self._last_obs = state["last_observation"]
-        self._last_episode_starts = state["last_episode_starts"]
-        buffer, replay = self.replay_buffer, state["replay"]
-        for name, values in replay["arrays"].items():
+        super().restore(state)
+        torch.set_rng_state(state["torch"])
+        np.random.set_state(tuple(state["numpy"]))  # noqa: NPY002
+        buffer = self.replay_buffer
+        buffer.pos, buffer.full = state["place"]
+        for name, values in state["replay"].items():
             getattr(buffer, name)[: len(values)] = values
-        buffer.pos, buffer.full = replay["pos"], replay["full"]
-        _restore_random(self, state["random"])
-
-
-def _optimizers(model: SAC) -> list[torch.optim.Optimizer]:
-    own = [model.actor.optimizer, model.critic.optimizer]
-    return own + ([model.ent_coef_optimizer] if model.ent_coef_optimizer is not None else [])
-
-
-def _random_state(model: SAC) -> Tree:
-    kind, keys, position, has_gauss, gauss = np.random.get_state(legacy=True)  # noqa: NPY002
-    return {
-        "torch": torch.get_rng_state().numpy(),
-        "numpy": [str(kind), np.asarray(keys), int(position), int(has_gauss), float(gauss)],
-        "actions": model.action_space.np_random.bit_generator.state,
-    }
-
-
-def _restore_random(model: SAC, state: Tree) -> None:
-    torch.set_rng_state(torch.from_numpy(state["torch"]))
-    np.random.set_state(tuple(state["numpy"]))  # noqa: NPY002
-    model.action_space.np_random.bit_generator.state = state["actions"]

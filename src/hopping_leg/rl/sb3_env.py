@@ -7,17 +7,19 @@ import gymnasium
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
-from hopping_leg.arrays import Array, Array32, BoolArray
+from hopping_leg.arrays import Array, Array32, BoolArray, Stateful
 from hopping_leg.envs.task import HoppingTask, Step
 
 
-class TaskVecEnv(VecEnv):  # type: ignore[misc]
+class TaskVecEnv(Stateful, VecEnv):  # type: ignore[misc]
     """A ``HoppingTask`` for stable-baselines3.
 
     Observations are (n, size); the true state follows what is measured in the same rows, for
     critics that see it in training. All randomness is the task's; ``seed`` and ``set_options``
     of stable-baselines3 change nothing.
     """
+
+    STATE = ("task", "_return", "_length")
 
     def __init__(self, task: HoppingTask) -> None:
         self.task = task
@@ -80,19 +82,6 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
 
     def _observation(self, seen: Array32) -> Array32:
         return np.concatenate([seen, self.task.privileged()], axis=1)
-
-    def state(self) -> dict[str, Any]:
-        """Return everything needed to go on exactly from here."""
-        return {
-            "task": self.task.state(),
-            "return": self._return.copy(),
-            "length": self._length.copy(),
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on from a ``state``."""
-        self.task.restore(state["task"])
-        self._return[:], self._length[:] = state["return"], state["length"]
 
     def close(self) -> None:
         """Do nothing: the legs hold no resources beyond memory."""

@@ -23,7 +23,6 @@ from hopping_leg.controllers import robot_numbers
 from hopping_leg.controllers.mpc import HopShape, Planning, TrueStateMpc
 from hopping_leg.envs.hidden_state import HiddenState
 from hopping_leg.envs.task import HoppingTask, Step
-from hopping_leg.rl.checkpoint import Tree, to_torch
 from hopping_leg.rl.distillation.students import (
     LabelledRollout,
     RolloutBuffer,
@@ -92,6 +91,11 @@ class Dagger(Learner):
 
     Everything random follows from the seed, on any number of cores.
     """
+
+    STATE = (
+        *("student", "optimizer", "task", "teacher", "num_timesteps", "_buffer", "_hidden"),
+        *("_seen", "_begun", "_held", "_posture", "_memory", "_label", "_draws", "_mixing"),
+    )
 
     def __init__(
         self, task: HoppingTask, config: DaggerConfig, network: StudentConfig, seed: int
@@ -242,38 +246,3 @@ class Dagger(Learner):
     def network(self) -> Student:
         """Return the student as it stands."""
         return self.student
-
-    def state(self) -> Tree:
-        """Return everything needed to continue exactly, environments included."""
-        return {
-            "student": self.student.state_dict(),
-            "optimizer": self.optimizer.state_dict(),
-            "buffer": self._buffer.state(),
-            "task": self.task.state(),
-            "teacher": self.teacher.state(),
-            "begun": self._begun,
-            "held": self._held,
-            "posture": self._posture,
-            "memory": self._memory.numpy(),
-            "label": self._label,
-            "draws": self._draws.get_state().numpy(),
-            "mixing": self._mixing.bit_generator.state,
-            "steps": self.num_timesteps,
-            "hidden": self._hidden.state() if self._hidden else {},
-        }
-
-    def restore(self, state: Tree) -> None:
-        """Go on from a ``state``."""
-        self.student.load_state_dict(to_torch(state["student"]))
-        self.optimizer.load_state_dict(to_torch(state["optimizer"]))
-        self._buffer.restore(state["buffer"])
-        self._seen = self.task.restore(state["task"])
-        self.teacher.restore(state["teacher"])
-        self._begun, self._label = state["begun"], state["label"]
-        self._held, self._posture = np.array(state["held"]), np.array(state["posture"])
-        self._memory = torch.from_numpy(state["memory"])
-        self._draws.set_state(torch.from_numpy(state["draws"]))
-        self._mixing.bit_generator.state = state["mixing"]
-        self.num_timesteps = state["steps"]
-        if self._hidden:
-            self._hidden.restore(state["hidden"])

@@ -109,14 +109,14 @@ class RolloutBuffer:
 
     def state(self) -> Tree:
         """Return everything that is held."""
-        arrays = {name: array[: self.filled].numpy() for name, array in self._arrays.items()}
+        arrays = {name: array[: self.filled] for name, array in self._arrays.items()}
         return {"added": self.added, **arrays}
 
     def restore(self, state: Tree) -> None:
         """Go on from a ``state``."""
         self.added = state["added"]
         for name, array in self._arrays.items():
-            array[: self.filled] = torch.from_numpy(state[name])
+            array[: self.filled] = state[name]
 
 
 @dataclass(frozen=True)
