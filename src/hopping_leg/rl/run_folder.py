@@ -151,9 +151,7 @@ step {1000 * TIMESTEP:g} ms, the first 2 s of each trial dropped. These seeds ch
 def _stages(rows: list[dict[str, Any]]) -> str:
     """Return lines on the stages of a distillation, if it was one."""
     shown = "".join(
-        f"  - {row['name']}: {row['score']} {_mm(row['score_m'])} mm"
-        f" after {row['seconds']:.0f} s, {'passed' if row['passed'] else '**not passed**'}"
-        f" (at most {1000 * row['must_score_m']:g} mm)\n"
+        f"  - {row['name']}: score {_mm(row['score_m'])} mm after {row['seconds']:.0f} s\n"
         for row in rows
     )
     return f"- Stages:\n{shown}" if rows else ""

@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,10 @@ from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.terminal import Progress
 
+_STAGES = ("teacher", "student, helped", "student, alone", "student, calibrated")
+"""Parts of a distillation. Each ends with a score, m: median error and scatter at the worst height,
+or, while the teacher helps, the mean error of the student's hops."""
+
 _RANGE_LEGS, _RANGE_STRIDE = 24, 5
 """Legs of any size whose hops tell a policy's range of inputs, and which of their heights do."""
 
@@ -36,43 +40,6 @@ class Trained:
     """Wall-clock time of the training, pauses excluded."""
     steps: int
     """Control steps of experience."""
-
-
-@dataclass(frozen=True)
-class Stage:
-    """A part of a distillation, with a score that it has to reach."""
-
-    name: str
-    until: float
-    """Share of the training with which it ends."""
-    score: str
-    """What decides, in words; in m, less is better."""
-    must_score: float
-    """Largest score with which it is passed, m."""
-
-    def ended(self, score: float, seconds: float) -> dict[str, Any]:
-        """Return its result after so much time, s, as JSON values."""
-        row = asdict(self)
-        must = {"must_score_m": row.pop("must_score"), "score_m": score}
-        return {**row, **must, "passed": score <= self.must_score, "seconds": seconds}
-
-
-def stages_of(recipe: Recipe) -> tuple[Stage, ...]:
-    """Return the stages of a distillation in order; no other recipe has any.
-
-    First the teacher alone has to hop. Then the student hops, at first with the teacher's help,
-    then alone, and at last its command is calibrated.
-    """
-    if not isinstance(recipe.algorithm, DaggerConfig):
-        return ()
-    worst = "median error and scatter at the worst height"
-    helped = 0.15 if recipe.legs == "any" else 0.03  # legs of any size take longer
-    return (
-        Stage("teacher", 0.0, worst, 0.006),
-        Stage("student, helped", recipe.algorithm.mixing_share, "mean error of its hops", helped),
-        Stage("student, alone", 1.0, worst, 0.030),
-        Stage("student, calibrated", 1.0, worst, 0.010),
-    )
 
 
 def train(
@@ -161,7 +128,9 @@ class Trainer:
         if minutes is not None:
             self.learner.remaining = lambda: max(0.0, 1 - self.elapsed / self._seconds)
         self.selection = Selection(recipe, robot, folder.path / "snapshots")
-        self._stages = stages_of(recipe)
+        how = recipe.algorithm
+        self._helped = how.mixing_share if isinstance(how, DaggerConfig) else None
+        """Share of a distillation in which the teacher helps; None for other trainings."""
         self.stages: list[dict[str, Any]] = []
         """How the stages of a distillation ended so far, as JSON values."""
         self.seconds: dict[str, float] = {"before the first rollout": time.monotonic() - began}
@@ -239,19 +208,20 @@ class Trainer:
 
     def _at_boundary(self) -> None:
         self._show()
-        due = self.learner.num_timesteps >= self.selection.next_at
-        if due and self.learner.share >= self.recipe.selection.eval_start:
+        learner = self.learner
+        due = learner.num_timesteps >= self.selection.next_at
+        if due and learner.share >= self.recipe.selection.eval_start:
             self._evaluate()
-        if len(self.stages) == 1 and self.learner.share >= self._stages[1].until:
-            self.end_stage(self.learner.task.mean_apex_error)
+        if self._helped is not None and len(self.stages) == 1 and learner.share >= self._helped:
+            self.end_stage(learner.task.mean_apex_error)
         if time.monotonic() - self._saved >= self.recipe.schedule.checkpoint_seconds:
             self.checkpoint()
 
     def end_stage(self, score: float) -> None:
         """Note how the present stage of a distillation ended."""
-        if self._stages:
-            stage = self._stages[len(self.stages)]
-            self.stages.append(stage.ended(score, self.elapsed))
+        if self._helped is not None:
+            name = _STAGES[len(self.stages)]
+            self.stages.append({"name": name, "score_m": score, "seconds": self.elapsed})
 
     def checkpoint(self) -> None:
         """Write a checkpoint; only at a boundary does it continue exactly."""
