@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from hopping_leg.cli import main
 from hopping_leg.errors import RecordingError, TraceError
 from hopping_leg.formats import COLUMNS, JOINT_STATE, STATES, bag_files, read_bag
-from hopping_leg.identify.recording import Recording, load_recording
+from hopping_leg.identify.recording import load_recording
 from hopping_leg.robot import load_robot
 from hopping_leg.trace import COLUMNS as TRACED
 from hopping_leg.trace import Trace
 from tests.extras import run_without
-from tests.identify.runs import METADATA, SIDECAR, swinging
+from tests.identify.runs import SIDECAR, swinging
 
 pytest.importorskip("mcap_ros2", reason="the extra 'ros' is not installed")
 from hopping_leg.formats import to_mcap
@@ -56,8 +56,7 @@ def test_samples_and_times_come_back_as_they_were(seed, rows, tmp_path_factory):
     )
     table = {column: values[JOINTS.index(column)] for column in chosen}
     trace = Trace(pl.DataFrame({"time_s": stamps / 1e9, **table}), {"robot": "legv2", "seed": 3})
-    back, header = read(written(tmp_path_factory.mktemp("bag"), trace))
-    assert header == trace.header
+    back = read(written(tmp_path_factory.mktemp("bag"), trace))
     wanted = (stamps - stamps[0] // 10**9 * 10**9) / 1e9
     near = 5e-10 + 1e-16 * stamps[-1] / 1e9
     np.testing.assert_allclose(back["time_s"], wanted, rtol=0, atol=near)
@@ -103,7 +102,7 @@ def test_a_row_has_the_newest_command_that_was_logged_by_then(tmp_path):
     table = pl.DataFrame({"time_s": [0.0, 0.01, 0.02], "hip_position_rad": [1.0, 2.0, 3.0]})
     late = pl.DataFrame({"time_s": [0.005, 0.015], "hip_command_nm": [5.0, 6.0]})
     record(tmp_path / "bag", "mcap", table, late)
-    back, _ = read(tmp_path / "bag")
+    back = read(tmp_path / "bag")
     assert back["hip_command_nm"].to_list() == [None, 5.0, 6.0]
 
 
@@ -117,14 +116,6 @@ def test_a_sidecar_names_joints_that_are_called_otherwise(tmp_path):
     (tmp_path / "bag.toml").write_text(f"{SIDECAR}[columns]\n{names}")
     found = load_recording(tmp_path / "bag").trace.column("knee_position_rad")
     np.testing.assert_array_equal(found, swinging(50)["knee_position_rad"])
-
-
-def test_a_recording_needs_no_sidecar_after_its_way_through_mcap(tmp_path):
-    Recording(Trace(swinging(60)), METADATA, "run").save(tmp_path / "run.parquet")
-    again = load_recording(written(tmp_path, Trace.load(tmp_path / "run.parquet")))
-    assert again.metadata == METADATA
-    for name, column in swinging(60).to_dict().items():
-        np.testing.assert_allclose(again.trace.column(name), column, rtol=0, atol=1e-9)
 
 
 def test_what_is_no_bag_is_said_in_a_sentence(tmp_path):

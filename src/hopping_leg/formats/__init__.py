@@ -17,7 +17,7 @@ import polars as pl
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError, TraceError
-from hopping_leg.io import Tree, parse_json
+from hopping_leg.io import Tree
 from hopping_leg.trace import SCHEMA, Trace
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -54,9 +54,6 @@ NAMES = {
 }
 """What a bag's own columns are called for each of a recording's."""
 
-KEY = "hopping_leg"
-"""Metadata record of an MCAP file that holds a trace's header as JSON."""
-
 _MCAP, _SQLITE = b"\x89MCAP0\r\n", b"SQLite format 3\0"
 _LOGGED, _STAMP = "/logged", "/stamp"  # columns of times, ns; no topic is called so
 
@@ -78,7 +75,7 @@ def to_mcap(trace: Trace) -> bytes:
     content = io.BytesIO()
     with Writer(content) as writer:
         header = json.dumps({"schema": SCHEMA, **trace.header}, sort_keys=True)
-        writer.add_metadata(KEY, {"header": header})
+        writer.add_metadata("hopping_leg", {"header": header})
         kinds = {
             name: writer.register_msgdef(name, definitions.generate_msgdef(name, ros_version=2)[0])
             for name in (JOINT_STATE, FLOAT)
@@ -121,8 +118,8 @@ def bag_files(path: Path) -> list[Path]:
         return [path] if file.read(len(_SQLITE)).startswith((_MCAP, _SQLITE)) else []
 
 
-def read_bag(path: Path, origin: str) -> tuple[pl.DataFrame, Tree]:
-    """Return the joints of a bag as a table; of one that was made of a trace also its header.
+def read_bag(path: Path, origin: str) -> pl.DataFrame:
+    """Return the joints of a bag as a table.
 
     The table has ``time_s``, counted from the whole second of the first row, and the columns of a
     trace where topics and joints are called as in ``COLUMNS``. RecordingError says that the bag is
@@ -130,9 +127,8 @@ def read_bag(path: Path, origin: str) -> tuple[pl.DataFrame, Tree]:
     """
     try:
         states, numbers = _messages(path)
-        header = _header(path, origin) if path.suffix == ".mcap" else {}
         table = _join(states, numbers) if states else None
-    except (ModuleNotFoundError, RecordingError):
+    except ModuleNotFoundError:
         raise
     except Exception as error:  # readers raise many unrelated types where a file is damaged
         raise RecordingError(
@@ -144,7 +140,7 @@ def read_bag(path: Path, origin: str) -> tuple[pl.DataFrame, Tree]:
             f"{origin} holds no message of {JOINT_STATE}; record the topic that has the joints."
         )
     named = [pl.col(own).alias(name) for name, own in NAMES.items() if own in table]
-    return table.with_columns(named), header
+    return table.with_columns(named)
 
 
 def _messages(path: Path) -> tuple[Rows, Rows]:
@@ -170,20 +166,6 @@ def _messages(path: Path) -> tuple[Rows, Rows]:
                         row[f"{name}/{joint}.{quantity}"] = float(value)
             states.setdefault(name, []).append(row)
     return states, numbers
-
-
-def _header(file: Path, origin: str) -> Tree:
-    """Return the header of the trace that a file was made of, empty for others."""
-    from mcap.reader import SeekingReader
-
-    with file.open("rb") as stream:
-        for entry in SeekingReader(stream).iter_metadata():
-            if entry.name == KEY:
-                text = entry.metadata["header"]
-                header = parse_json(text, f"{origin}: its header", RecordingError)
-                del header["schema"]
-                return header
-    return {}
 
 
 def _join(states: Rows, numbers: Rows) -> pl.DataFrame:

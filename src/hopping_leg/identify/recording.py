@@ -157,7 +157,7 @@ def _read(path: Path, origin: str) -> tuple[pl.DataFrame, dict[str, Any], str]:
         tables = [_read_csv(file.read_bytes(), str(file)) for file in logs]
         return pl.concat(tables, how="horizontal"), {}, digest
     if bag:
-        return *read_bag(path, origin), digest
+        return read_bag(path, origin), {}, digest
     if content.startswith(_PARQUET):
         table, metadata = read_parquet(content, origin, RecordingError)
         native = "hopping_leg" in metadata
