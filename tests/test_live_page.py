@@ -159,7 +159,7 @@ def test_first_hops_are_those_of_the_package_with_the_same_draws_and_keep_pace(
 ):
     seed, command, leg = 5, 0.3, load_robot(robot)
     expected = rollout(
-        load_controller(controller, leg, other="accept", simulated=True),
+        load_controller(controller, leg, simulated=True),
         RolloutConfig(leg, threads=1),
         np.full((TICKS, 1), command),
         seed,

@@ -151,7 +151,7 @@ _KEPT = ("command_m", "median_error_m", "median_abs_error_m", "std_m", "hops", "
 
 def load(controller: str | Path, told: str) -> Controller:
     """Return a controller that is told a robot, by name or file."""
-    return load_controller(controller, load_robot(told), other="accept")
+    return load_controller(controller, load_robot(told))
 
 
 def hop(

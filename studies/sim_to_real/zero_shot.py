@@ -123,7 +123,7 @@ def try_out(source: str, name: str, commands: Sequence[float], seconds: float, n
 
 
 def _load(name: str, believed: Robot) -> Controller:
-    return load_controller(name, believed, other="accept", simulated=True)
+    return load_controller(name, believed, simulated=True)
 
 
 def summarize(pairs: Sequence[Row]) -> list[Row]:

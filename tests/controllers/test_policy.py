@@ -1,6 +1,5 @@
 import dataclasses
 import json
-import logging
 
 import numpy as np
 import onnx
@@ -58,18 +57,12 @@ def test_missing_file_and_unknown_name(tmp_path):
         load_controller(tmp_path / "weights.zip", ROBOT)
 
 
-def test_another_robot_is_refused_or_named(file, caplog):
+def test_another_robot_is_named_and_another_rate_refused(file):
     other = dataclasses.replace(ROBOT, base=dataclasses.replace(ROBOT.base, mass=2.0))
-    with pytest.raises(PolicyError, match="trained on robot 'legv2'"):
-        load_controller(file, other, other="refuse")
-    with caplog.at_level(logging.WARNING):
-        load_controller(file, other)
-    assert "trained on robot" in caplog.text
-    caplog.clear()
-    load_controller(file, other, other="accept")
-    assert not caplog.text
+    policy = load_controller(file, other)
+    assert "mine was trained on robot 'legv2'" in policy.stranger(other, "mine")
     with pytest.raises(PolicyError, match="400 Hz"):
-        load_policy(file).check_robot(ROBOT, 400.0)
+        load_controller(file, ROBOT, rate=400.0)
 
 
 @pytest.mark.parametrize("command", [0.1, 0.5, np.nan])

@@ -97,14 +97,18 @@ def _sequence(args: Deploy, robot: Robot) -> "motion_sequence.MotionSequence":
 
     if args.schedule is not None and args.command is not None:
         raise UsageError("--command and --schedule exclude each other; give one of them.")
-    controller = registry.load_controller(
-        args.controller, robot, other="warn" if args.other_robot else "refuse"
-    )
-    if isinstance(controller, policy.Policy) and controller.seconds > _MOST_SHARE / CONTROL_RATE:
-        raise PolicyError(
-            f"{args.controller} takes {controller.seconds * 1e3:.1f} ms of a control period of"
-            f" {1e3 / CONTROL_RATE:g} ms on this computer; make it smaller, or end other programs."
-        )
+    controller = registry.load_controller(args.controller, robot)
+    if isinstance(controller, policy.Policy):
+        stranger = controller.stranger(robot, args.controller)
+        if stranger and not args.other_robot:
+            remedy = "Train one for it with `hop train --robot`, or add --other-robot."
+            raise PolicyError(f"{stranger} {remedy}")
+        options.say(*filter(None, [stranger]))
+        if controller.seconds > _MOST_SHARE / CONTROL_RATE:
+            raise PolicyError(
+                f"{args.controller} takes {controller.seconds * 1e3:.1f} ms of a control period of"
+                f" {1e3 / CONTROL_RATE:g} ms here; make it smaller, or end other programs."
+            )
     valid = command_schedule.command_range(controller, robot)
     if args.schedule is not None:
         schedule = command_schedule.CommandSchedule.parse(args.schedule)

@@ -179,7 +179,7 @@ def _hop(
     told: dict[str, tuple[str | Path, str]] = {**policies}
     told[ENERGY_SHAPING] = ENERGY_SHAPING, believed
     entries = [
-        Entry(name, load_controller(what, load_robot(robot), other="accept"))
+        Entry(name, load_controller(what, load_robot(robot)))
         for name, (what, robot) in told.items()
     ]
     with Progress(parts=len(entries)) as bar:

@@ -6,13 +6,12 @@ layout, control rate and command range are in its metadata. It runs through onnx
 
 import hashlib
 import json
-import logging
 import os
 import threading
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -87,10 +86,6 @@ and zeros at first."""
 INPUTS = ("hip position", "knee position", "hip velocity", "knee velocity")
 """What a card's ``input_low`` and ``input_high`` bound."""
 
-OtherRobot = Literal["refuse", "warn", "accept"]
-"""What to do with a policy that was trained for another robot."""
-
-_log = logging.getLogger(__name__)
 _ROUNDING = 1e-9
 _MOST_RATE = 1e4  # Hz
 _MARGIN = 0.25  # Share of its range of inputs by which they may lie beyond it
@@ -209,8 +204,8 @@ class Policy:
         if self.for_any_leg:
             self.scale = robot.size
 
-    def check_robot(self, robot: Robot, rate: float, *, other: OtherRobot = "refuse") -> None:
-        """Tell the policy its robot; PolicyError for another rate, Hz, or a robot to be refused."""
+    def check_robot(self, robot: Robot, rate: float) -> None:
+        """Tell the policy its robot, be it a ``stranger``; PolicyError for another rate, Hz."""
         trained = self.card.rate
         if rate != trained:
             raise PolicyError(
@@ -218,14 +213,6 @@ class Policy:
                 f" set --rate {trained:g}."
             )
         self.set_robot(robot)
-        sentence = self.stranger(robot, self.origin)
-        if sentence and other == "refuse":
-            raise PolicyError(
-                f"{sentence} Train one for it with `hop train --robot`,"
-                " or allow another robot explicitly."
-            )
-        if sentence and other == "warn":
-            _log.warning(sentence)
 
     def stranger(self, robot: Robot, name: str) -> str:
         """Return a sentence that names the policy if a robot is not that of its training, or ""."""

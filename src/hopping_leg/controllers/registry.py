@@ -7,7 +7,7 @@ from pathlib import Path
 
 from hopping_leg.controllers import energy_shaping, mpc, protocol, user_controllers
 from hopping_leg.controllers.energy_shaping.gains import load_gains
-from hopping_leg.controllers.policy import Card, OtherRobot, Policy
+from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.errors import PolicyError, UsageError, unknown_name
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot, shipped_robots
 from hopping_leg.sim import CONTROL_RATE
@@ -92,7 +92,6 @@ def load_controller(
     robot: Robot,
     *,
     rate: float = CONTROL_RATE,
-    other: OtherRobot = "warn",
     simulated: bool = False,
 ) -> protocol.Controller:
     """Load a controller for a robot that it shall drive at a rate, Hz.
@@ -102,7 +101,7 @@ def load_controller(
     state.
 
     Raises:
-        PolicyError: The file is missing, truncated or foreign, or does not fit the robot or rate.
+        PolicyError: The file is missing, truncated or foreign, or does not fit the rate.
         ControllerError: A Python class cannot be loaded or is no controller.
         UsageError: There is no such controller, or it needs a simulated leg.
     """
@@ -121,5 +120,5 @@ def load_controller(
     if user_controllers.is_user_controller(name):
         return user_controllers.load_user_controller(name, robot, rate)
     policy = load_policy(name_or_path)
-    policy.check_robot(robot, rate, other=other)
+    policy.check_robot(robot, rate)
     return policy

@@ -81,7 +81,7 @@ def _expand(text: str) -> list[tuple[str, str]]:
 
 
 def _load(label: str, source: str, robot: Robot, rate: float) -> Entry:
-    controller = load_controller(source, robot, rate=rate, other="accept", simulated=True)
+    controller = load_controller(source, robot, rate=rate, simulated=True)
     note = controller.stranger(robot, label) if isinstance(controller, Policy) else None
     return Entry(label, controller, notes=(note,) if note else ())
 

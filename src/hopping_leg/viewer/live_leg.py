@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hopping_leg.controllers import command_schedule, protocol, registry
+from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import Robot, SoftLimits, load_robot
@@ -129,6 +130,8 @@ class LiveSimulation:
         if not 1 <= len(names) <= MOST:
             raise UsageError(f"{len(names)} controllers were given; give one, or two side by side.")
         controllers = [registry.load_controller(name, robot) for name in names]
+        policies = (c for c in controllers if isinstance(c, Policy))
+        self.notices += filter(None, (p.stranger(robot, p.name) for p in policies))
         self.valid = _shared_range(controllers, robot)
         if robot != self.robot:
             self.settings = default_settings(robot)
