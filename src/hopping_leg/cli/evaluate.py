@@ -11,7 +11,7 @@ then all at once.
 Examples:
   hop evaluate fast energy-shaping
   hop evaluate fast energy-shaping --out runs/first
-  hop evaluate 'runs/*/policy.onnx' --commands 0.25 0.30 --json result.json
+  hop evaluate runs/*/policy.onnx --commands 0.25 0.30 --json result.json
   hop evaluate energy-shaping --robot my_leg.toml --seeds 20 --floor stiff
   hop evaluate fast energy-shaping --suite robustness --axes payload delay
   hop evaluate fast --robot leg.toml --posterior leg.json --json prediction.json
@@ -40,8 +40,8 @@ class Evaluate:
     """What is judged, where, under which conditions and how often."""
 
     controllers: tyro.conf.Positional[tuple[str, ...]]
-    """Names (energy-shaping, paper, fast, ...), .onnx files, a quoted pattern of them, or Python
-    classes as FILE.py:CLASS; LABEL=FILE chooses the name in all tables."""
+    """Names (energy-shaping, paper, fast, ...), .onnx files, or Python classes as FILE.py:CLASS;
+    LABEL=FILE chooses the name in all tables."""
     robot: options.OwnRobot = None
     commands: options.Heights | None = None
     """Apex heights, m; default 0.25,0.30,0.35, scaled to the leg's length."""

@@ -65,8 +65,6 @@ def robot_of(controllers: Sequence[str]) -> str:
     default robot.
     """
     for text in controllers:
-        found = sorted(Path().glob(text)) if "*" in text else []
-        text = str(found[0]) if found else text
         name = text if Path(text).exists() else text.rpartition("=")[2]
         if name in shipped_policies() or (name.endswith(".onnx") and Path(name).is_file()):
             policy = load_policy(name)

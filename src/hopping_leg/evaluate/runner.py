@@ -1,7 +1,6 @@
 """Evaluate controllers: load what is judged, run the paper's trials, measure, compare."""
 
 import functools
-import glob
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -13,7 +12,7 @@ from hopping_leg.controllers import Controller, RolloutConfig
 from hopping_leg.controllers.command_schedule import check_heights, within
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.errors import PolicyError, UsageError
+from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import motor_load, prediction, result, trials
 from hopping_leg.io import versions
 from hopping_leg.robot import JOINTS, TIMESTEP, Robot, braking_times
@@ -44,13 +43,11 @@ class Entry:
 def load_entries(names: Sequence[str], robot: Robot, rate: float) -> list[Entry]:
     """Load every controller that is named, for the leg that it shall drive and a rate, Hz.
 
-    Names are shipped ones, ``.onnx`` files, or patterns of such; ``LABEL=FILE`` gives a file
-    another name in all tables, and those of ``runs/*/policy.onnx`` go by their folders. PolicyError
-    says that a file is unreadable, does not fit, or that a pattern matches nothing, UsageError that
-    there is no such controller.
+    Names are shipped ones or ``.onnx`` files; ``LABEL=FILE`` gives a file another name in all
+    tables. PolicyError says that a file is unreadable or does not fit, UsageError that there is no
+    such controller.
     """
-    expanded = dict.fromkeys(pair for text in names for pair in _expand(text))
-    return [_load(label, source, robot, rate) for label, source in expanded]
+    return [_load(text, robot, rate) for text in dict.fromkeys(names)]
 
 
 def check_entries(entries: Sequence[Entry], commands: Sequence[float]) -> None:
@@ -65,22 +62,9 @@ def check_entries(entries: Sequence[Entry], commands: Sequence[float]) -> None:
             check_heights(commands, entry.command_range, entry.label)
 
 
-def _expand(text: str) -> list[tuple[str, str]]:
-    """Return the label and source of everything that a text names."""
-    if not any(sign in text for sign in "*?["):
-        label, _, source = (text, "", text) if Path(text).exists() else text.rpartition("=")
-        return [(label or source, source)]
-    found = sorted(glob.glob(text, recursive=True))  # noqa: PTH207
-    if not found:
-        raise PolicyError(f"No policy file matches '{text}'; quote the pattern and check the path.")
-    folders = [Path(path).parent.name for path in found]
-    alike = len({Path(path).name for path in found}) == 1
-    if len(found) > 1 and alike and len(set(folders)) == len(folders):
-        return list(zip(folders, found, strict=True))
-    return [(path, path) for path in found]
-
-
-def _load(label: str, source: str, robot: Robot, rate: float) -> Entry:
+def _load(text: str, robot: Robot, rate: float) -> Entry:
+    label, _, source = (text, "", text) if Path(text).exists() else text.rpartition("=")
+    label = label or source
     controller = load_controller(source, robot, rate=rate, simulated=True)
     note = controller.stranger(robot, label) if isinstance(controller, Policy) else None
     return Entry(label, controller, notes=(note,) if note else ())
