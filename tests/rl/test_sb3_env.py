@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from stable_baselines3.common.vec_env import VecMonitor
 
 from hopping_leg.envs import HoppingTask, TaskConfig
 from hopping_leg.rl.sb3_env import TaskVecEnv
@@ -11,7 +12,7 @@ from tests.rl.learners import ROBOT, TINY
 def make():
     options, rng = TaskConfig(episode=0.05), np.random.default_rng(0)
     task = HoppingTask(ROBOT, 3, options, TINY.make_reward(ROBOT), rng, 1)
-    return TaskVecEnv(task)
+    return VecMonitor(TaskVecEnv(task))
 
 
 def test_an_episode_ends_as_stable_baselines_wants_it():

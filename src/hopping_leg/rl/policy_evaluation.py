@@ -136,12 +136,6 @@ def command_score(result: CommandResult) -> float:
     return abs(result.median_error_m) + result.std_m + _PENALTY * min(faults, 3.0)
 
 
-def as_rows(results: list[CommandResult]) -> list[dict[str, Any]]:
-    """Return results as JSON rows; null stands for no hops."""
-    rows = [asdict(v) for v in results]
-    return [{k: None if v != v else v for k, v in row.items()} for row in rows]
-
-
 def _command_result(runs: list[Rollout], command: float, legs: range, rate: float) -> CommandResult:
     start = round(SETTLE * len(runs[0].time))
     hops: list[HopMeasurement] = []
@@ -244,5 +238,5 @@ class Selection:
         return {
             "score_m": score(results),
             "worst_score_m": max(map(command_score, results)),
-            "trials": as_rows(results),
+            "trials": io.plain([asdict(v) for v in results]),
         }

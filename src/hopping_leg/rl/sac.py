@@ -17,6 +17,7 @@ import torch
 from stable_baselines3 import SAC
 from stable_baselines3.common.policies import ContinuousCritic
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.common.vec_env import VecMonitor
 from stable_baselines3.sac.policies import Actor as SACActor
 from stable_baselines3.sac.policies import SACPolicy
 from torch import nn
@@ -35,7 +36,7 @@ _REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "
 class SACConfig:
     """Soft actor-critic with generalised state-dependent exploration (gSDE).
 
-    What is not named is as in stable-baselines3.
+    Names, and what is not named, are as in stable-baselines3.
     """
 
     learning_rate: float = 5e-4
@@ -57,27 +58,23 @@ class SACConfig:
 
     def make_learner(self, task: HoppingTask, network: NetworkConfig, seed: int) -> "ResumableSAC":
         """Build SAC with asymmetric critics."""
-        rate = self.learning_rate
+        options = vars(self).copy()
+        rate, log_std = options.pop("learning_rate"), options.pop("log_std")
         return ResumableSAC(
             AsymmetricSACPolicy,
-            TaskVecEnv(task),
+            VecMonitor(TaskVecEnv(task)),
             learning_rate=lambda remaining: rate * (0.1 + 0.9 * remaining),
-            buffer_size=self.buffer_size,
-            learning_starts=self.learning_starts,
-            batch_size=self.batch_size,
-            gamma=self.gamma,
-            train_freq=self.train_freq,
-            gradient_steps=self.gradient_steps,
             use_sde=True,
             sde_sample_freq=-1,
             policy_kwargs={
                 "net_arch": {"pi": list(network.actor), "qf": list(network.critic)},
                 "activation_fn": nn.ReLU,
-                "log_std_init": self.log_std,
+                "log_std_init": log_std,
                 "actor_size": task.observation.size,
             },
             seed=seed,
             device="cpu",
+            **options,
         )
 
 
@@ -122,14 +119,15 @@ class ResumableSAC(Stateful, SAC):  # type: ignore[misc]
 
     on_boundary: Callable[[], None] | None = None
     remaining: Callable[[], float] | None = None
-    env: TaskVecEnv
+    env: VecMonitor
     seconds: dict[str, float]
     _current_progress_remaining: float
 
     @property
     def task(self) -> HoppingTask:
         """The legs that learn."""
-        return self.env.task
+        task: HoppingTask = self.env.task
+        return task
 
     @property
     def share(self) -> float:

@@ -1,6 +1,5 @@
 """The hopping task as stable-baselines3 wants it: one VecEnv over many legs stepped at once."""
 
-import time
 from typing import Any
 
 import gymnasium
@@ -16,10 +15,10 @@ class TaskVecEnv(Stateful, VecEnv):  # type: ignore[misc]
 
     Observations are (n, size); the true state follows what is measured in the same rows, for
     critics that see it in training. All randomness is the task's; ``seed`` and ``set_options``
-    of stable-baselines3 change nothing.
+    of stable-baselines3 change nothing. Its ``VecMonitor`` tells of whole episodes.
     """
 
-    STATE = ("task", "_return", "_length")
+    STATE = ("task",)
 
     def __init__(self, task: HoppingTask) -> None:
         self.task = task
@@ -28,9 +27,6 @@ class TaskVecEnv(Stateful, VecEnv):  # type: ignore[misc]
         self.render_mode = None
         super().__init__(task.count, space, gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32))
         self._terms, self._steps = np.zeros(len(task.reward.names)), 0
-        self._return = np.zeros(task.count)
-        self._length = np.zeros(task.count, np.int64)
-        self._started = time.monotonic()
         self._nothing: list[dict[str, Any]] = [{} for _ in range(task.count)]
         self._action: Array32 = np.zeros((task.count, 2), np.float32)
 
@@ -44,7 +40,6 @@ class TaskVecEnv(Stateful, VecEnv):  # type: ignore[misc]
 
     def reset(self) -> Array32:
         """Begin new episodes of all legs."""
-        self._return[:], self._length[:] = 0.0, 0
         return self._observation(self.task.reset())
 
     def step_async(self, actions: Array32) -> None:
@@ -56,8 +51,6 @@ class TaskVecEnv(Stateful, VecEnv):  # type: ignore[misc]
         step = self.task.step(self._action)
         self._terms += np.mean(step.terms, axis=0)
         self._steps += 1
-        self._return += step.reward
-        self._length += 1
         done = step.terminated | step.truncated
         infos = self._end_episodes(step, done) if done.any() else self._nothing
         return self._observation(step.observation), step.reward, done, infos
@@ -71,13 +64,7 @@ class TaskVecEnv(Stateful, VecEnv):  # type: ignore[misc]
             infos[leg] = {
                 "terminal_observation": np.concatenate(final),
                 "TimeLimit.truncated": bool(step.truncated[leg]),
-                "episode": {
-                    "r": float(self._return[leg]),
-                    "l": int(self._length[leg]),
-                    "t": time.monotonic() - self._started,
-                },
             }
-        self._return[done], self._length[done] = 0.0, 0
         return infos
 
     def _observation(self, seen: Array32) -> Array32:
@@ -90,13 +77,11 @@ class TaskVecEnv(Stateful, VecEnv):  # type: ignore[misc]
         """Return an attribute once per selected leg."""
         return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
 
-    def set_attr(self, *_args: Any, **_kwargs: Any) -> None:  # noqa: ANN401
-        """Refuse: legs have no attributes of their own."""
-        raise NotImplementedError("legs have no attributes of their own; set them on the task")
+    def env_method(self, *_args: Any, **_kwargs: Any) -> Any:  # noqa: ANN401
+        """Refuse: legs have neither attributes nor methods of their own."""
+        raise NotImplementedError("legs have nothing of their own; set or call what the task has")
 
-    def env_method(self, *_args: Any, **_kwargs: Any) -> list[Any]:  # noqa: ANN401
-        """Refuse: legs have no methods of their own."""
-        raise NotImplementedError("legs have no methods of their own; call the task's")
+    set_attr = env_method
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:  # noqa: ANN401
         """Return False per selected leg."""
