@@ -97,7 +97,7 @@ def find_reach(
         disturbance=NO_NOISE, timestep=_STEP, threads=1,
     )  # fmt: skip
     most = robot.size * _REACHED_DRAWN
-    longest = _longest_run(results, lambda r: _hops(r, most) and r.body_contact_ticks == 0)
+    longest = _longest_run(results, lambda result: _hops(result, most))
     if len(longest) < _LEAST:
         return None
     return Reach(leg, longest[0].command_m, longest[-1].command_m)
@@ -159,10 +159,5 @@ def find_legs(
             rows = [asdict(reach) for reach in found]
             io.write_json(file, {"asked": asked, "tried": tried, "legs": rows})
             on_progress(min(len(found) / count, 1.0))
-    return [task_leg(reach) for reach in found[:count]]
-
-
-def task_leg(reach: Reach) -> TaskLeg:
-    """Return the leg for a task."""
-    leg = draw_any_leg(reach.leg)
-    return TaskLeg(leg.believed, leg.true, (reach.low, reach.high), leg.disturbed)
+    drawn = ((draw_any_leg(reach.leg), (reach.low, reach.high)) for reach in found[:count])
+    return [TaskLeg(leg.believed, leg.true, span, leg.disturbed) for leg, span in drawn]
