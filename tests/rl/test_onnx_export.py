@@ -13,7 +13,6 @@ from torch import nn
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.envs import TaskConfig
 from hopping_leg.envs.observation import make_observation
-from hopping_leg.rl.distillation.students import StudentConfig
 from hopping_leg.rl.onnx_export import (
     DenseActor,
     PolicyGraph,
@@ -21,6 +20,7 @@ from hopping_leg.rl.onnx_export import (
     every_centimetre,
     with_shifts,
 )
+from hopping_leg.rl.students import StudentConfig
 from hopping_leg.robot import load_robot
 
 ROBOT = load_robot("legv2-paper")

@@ -17,7 +17,7 @@ from hopping_leg import io
 from hopping_leg.controllers.mpc import HopShape, Planning, TrueStateMpc
 from hopping_leg.envs.task import TaskLeg
 from hopping_leg.errors import UsageError
-from hopping_leg.rl.distillation.dagger import DaggerConfig
+from hopping_leg.rl.dagger import DaggerConfig
 from hopping_leg.rl.onnx_export import every_centimetre
 from hopping_leg.rl.policy_evaluation import CommandResult, command_score, evaluate_policy
 from hopping_leg.rl.recipe import Recipe

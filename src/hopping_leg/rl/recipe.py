@@ -8,11 +8,11 @@ from typing import Any, Literal, Self
 import numpy as np
 
 from hopping_leg import envs, io
-from hopping_leg.rl.distillation.dagger import Dagger, DaggerConfig
-from hopping_leg.rl.distillation.students import StudentConfig
+from hopping_leg.rl.dagger import Dagger, DaggerConfig
 from hopping_leg.rl.learner import NetworkConfig
 from hopping_leg.rl.ppo import PPO, PPOConfig
 from hopping_leg.rl.sac import ResumableSAC, SACConfig
+from hopping_leg.rl.students import StudentConfig
 from hopping_leg.robot import DEFAULT_ROBOT, Robot
 
 WEIGHT_MOMENT = 0.548

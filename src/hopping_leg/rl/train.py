@@ -16,7 +16,7 @@ from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.envs import TaskLeg
 from hopping_leg.rl import onnx_export, reach, run_folder
 from hopping_leg.rl.checkpoint import write_checkpoint
-from hopping_leg.rl.distillation.dagger import DaggerConfig
+from hopping_leg.rl.dagger import DaggerConfig
 from hopping_leg.rl.policy_evaluation import FINAL_SEEDS, Selection, calibrate, input_range
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot.parameters import Robot

@@ -9,9 +9,9 @@ import msgspec
 
 from hopping_leg.controllers.user_controllers import load_user_object
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.rl.distillation.students import StudentConfig
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes import fast, paper, rl, universal
+from hopping_leg.rl.students import StudentConfig
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, Range
 
 RECIPES: Mapping[str, Recipe] = {

@@ -7,8 +7,8 @@ still soon.
 from hopping_leg.controllers.mpc import Planning
 from hopping_leg.envs import TaskConfig
 from hopping_leg.rl import recipe
-from hopping_leg.rl.distillation.dagger import DaggerConfig
-from hopping_leg.rl.distillation.students import StudentConfig
+from hopping_leg.rl.dagger import DaggerConfig
+from hopping_leg.rl.students import StudentConfig
 
 FAST = recipe.Recipe(
     name="fast",

@@ -12,9 +12,9 @@ from dataclasses import replace
 from hopping_leg.controllers.mpc import HopShape, Planning
 from hopping_leg.controllers.observation_history import AnyLeg
 from hopping_leg.rl import recipe
-from hopping_leg.rl.distillation.dagger import DaggerConfig
-from hopping_leg.rl.distillation.students import StudentConfig
+from hopping_leg.rl.dagger import DaggerConfig
 from hopping_leg.rl.recipes.fast import FAST
+from hopping_leg.rl.students import StudentConfig
 
 UNIVERSAL = recipe.Recipe(
     name="universal",

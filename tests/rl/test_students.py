@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch.nn import functional
 
-from hopping_leg.rl.distillation.students import LabelledRollout, RolloutBuffer, StudentConfig
+from hopping_leg.rl.students import LabelledRollout, RolloutBuffer, StudentConfig
 
 LEGS, TICKS, SIZE, UNSEEN = 5, 8, 2, 3
 

@@ -23,13 +23,13 @@ from hopping_leg.controllers import robot_numbers
 from hopping_leg.controllers.mpc import HopShape, Planning, TrueStateMpc
 from hopping_leg.envs.hidden_state import HiddenState
 from hopping_leg.envs.task import HoppingTask, Step
-from hopping_leg.rl.distillation.students import (
+from hopping_leg.rl.learner import Learner
+from hopping_leg.rl.students import (
     LabelledRollout,
     RolloutBuffer,
     Student,
     StudentConfig,
 )
-from hopping_leg.rl.learner import Learner
 from hopping_leg.robot import GRAVITY
 
 _PUSHED, _PUSHES = 0.15, 0.5

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from hopping_leg.envs.hidden_state import OF_MOTION
-from hopping_leg.rl.distillation.dagger import DaggerConfig
+from hopping_leg.rl.dagger import DaggerConfig
 from hopping_leg.sim import Measurement, leg_simulator
 from tests.rl.learners import (
     ROBOT,
