@@ -4,11 +4,7 @@ import dataclasses
 
 import pytest
 
-from hopping_leg.controllers.registry import (
-    load_policy,
-    robot_of,
-    shipped_policies,
-)
+from hopping_leg.controllers.registry import load_policy, robot_of, shipped_policies
 from hopping_leg.rl.onnx_export import with_card
 from hopping_leg.robot import DEFAULT_ROBOT, load_robot, shipped_robots
 
