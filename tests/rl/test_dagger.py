@@ -86,8 +86,7 @@ def test_a_policy_file_acts_on_measurements_as_the_student_did(recipe):
     file, task = policy_file(recipe, made), made.task
     asked, measured, step = [], [], task.step
     task.step = lambda action: (
-        measured.append(task.plant.channel.measurement(task._samples)),
-        asked.append(np.array(action)), step(action),
+        measured.append(task.measurement), asked.append(np.array(action)), step(action)
     )[2]  # fmt: skip
     made._left = 0.5
     made._collect()
@@ -160,7 +159,7 @@ def test_a_policy_for_any_leg_acts_on_each_as_the_student_did():
     for _ in range(60):
         with torch.no_grad():
             action, memory = student(torch.from_numpy(seen), memory)
-        m = task.plant.channel.measurement(task._samples)
+        m = task.measurement
         for row, file in enumerate(files):
             one = Measurement(*(part[row : row + 1] for part in (m.q, m.qd, m.command, m.age)))
             wanted = action[row].clip(-1, 1).numpy() * task.full_torque[row]

@@ -204,16 +204,6 @@ class Policy:
         if self.for_any_leg:
             self.scale = robot.size
 
-    def check_robot(self, robot: Robot, rate: float) -> None:
-        """Tell the policy its robot, be it a ``stranger``; PolicyError for another rate, Hz."""
-        trained = self.card.rate
-        if rate != trained:
-            raise PolicyError(
-                f"{self.origin} was trained at {trained:g} Hz and cannot run at {rate:g} Hz;"
-                f" set --rate {trained:g}."
-            )
-        self.set_robot(robot)
-
     def stranger(self, robot: Robot, name: str) -> str:
         """Return a sentence that names the policy if a robot is not that of its training, or ""."""
         card = self.card

@@ -118,5 +118,10 @@ def load_controller(
     if user_controllers.is_user_controller(name):
         return user_controllers.load_user_controller(name, robot, rate)
     policy = load_policy(name_or_path)
-    policy.check_robot(robot, rate)
+    if rate != (trained := policy.card.rate):
+        raise PolicyError(
+            f"{policy.origin} was trained at {trained:g} Hz and cannot run at {rate:g} Hz;"
+            f" set --rate {trained:g}."
+        )
+    policy.set_robot(robot)
     return policy

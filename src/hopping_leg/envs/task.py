@@ -17,7 +17,7 @@ from hopping_leg.envs.apex_reward import ballistic_apex
 from hopping_leg.envs.initial_states import InitialStates
 from hopping_leg.envs.observation import make_observation, sample_scaling
 from hopping_leg.robot import Robot
-from hopping_leg.sim import LegSimulator, Plant, randomization
+from hopping_leg.sim import LegSimulator, Measurement, Plant, randomization
 from hopping_leg.sim.compiled import compiled
 
 _RECENT = 500  # Hops that count as the latest
@@ -266,6 +266,11 @@ class HoppingTask(Stateful):
         self._plan()
         self._samples = self.plant.samples(self.command)
         return self.observation.view(self._samples)
+
+    @property
+    def measurement(self) -> Measurement:
+        """What the observation was made of: samples and their age."""
+        return self.plant.channel.measurement(self._samples)
 
     def _see_anew(self, rows: IntArray) -> Array32:
         self._samples = self.plant.samples(self.command)

@@ -60,7 +60,7 @@ class SACConfig:
         """Build SAC with asymmetric critics."""
         options = vars(self).copy()
         rate, log_std = options.pop("learning_rate"), options.pop("log_std")
-        return ResumableSAC(
+        learner = ResumableSAC(
             AsymmetricSACPolicy,
             VecMonitor(TaskVecEnv(task)),
             learning_rate=lambda remaining: rate * (0.1 + 0.9 * remaining),
@@ -76,6 +76,8 @@ class SACConfig:
             device="cpu",
             **options,
         )
+        learner.seconds = {"rollouts": 0.0, "gradient steps": 0.0}
+        return learner
 
 
 class _Columns(BaseFeaturesExtractor):  # type: ignore[misc]
@@ -133,10 +135,6 @@ class ResumableSAC(Stateful, SAC):  # type: ignore[misc]
     def share(self) -> float:
         """Share of the training that is done, 0 to 1."""
         return 1 - float(self._current_progress_remaining)
-
-    def _setup_model(self) -> None:
-        super()._setup_model()
-        self.seconds = {"rollouts": 0.0, "gradient steps": 0.0}
 
     def train_until(self, steps: int, callback: Callable[[], bool], log_interval: int) -> None:
         """Learn until so many control steps are done in all, or until the callback says no."""
