@@ -31,17 +31,18 @@ def stopped(**stops):
     return dataclasses.replace(ROBOT, **joints)
 
 
+@pytest.mark.parametrize("bend", ["backward", "forward"])
 @pytest.mark.parametrize("swing", [10.0, None], ids=["swinging", "vertical"])
-def test_the_foot_follows_the_papers_formula(swing):
+def test_the_foot_follows_the_papers_formula(bend, swing):
     time = np.arange(0, 10, 0.005)
-    stroke = Stroke(0.1, 0.5, swing, 10.0, margin=0.005)
+    stroke = Stroke(0.1, 0.5, swing, 10.0, margin=0.005, bend=bend)
     angles = stroke.joints(ROBOT, time)
     distance = 0.1 * np.cos(2 * np.pi * time / 0.5) + REACH - 0.1 - 0.005
     theta = -np.pi / 2 * np.cos(2 * np.pi * time / 10) if swing else 0.0
     foot = kinematics.foot_position(ROBOT, angles)
     np.testing.assert_allclose(foot[:, 0], distance * np.cos(theta), atol=1e-9)
     np.testing.assert_allclose(foot[:, 1], distance * np.sin(theta), atol=1e-9)
-    assert (angles[:, 1] < 0).all()
+    assert (np.sign(angles[:, 1]) == (-1 if bend == "backward" else 1)).all()
 
 
 @pytest.mark.parametrize("robot", ["legv2", "legv2-paper", "legv1", "doublependulum"])

@@ -73,6 +73,8 @@ class MovingBase(Common):
     """Duration of all strokes together, s."""
     margin: float = 0.0
     """How far the leg stays from straight, m; 0 is the paper's text, 0.005 the lab's recordings."""
+    bend: paper.Bend = "backward"
+    """Side of the knee; the lab's fixed-base recordings bend forward."""
     adapt: bool = True
     """Shrink amplitudes that the leg cannot follow instead of refusing them."""
 
@@ -137,7 +139,10 @@ def run(
         make = paper.moving_base
         if isinstance(args, FixedBase):
             make = partial(paper.fixed_base, swings=args.swings)
-        template = make(args.amplitudes, args.periods, duration=args.duration, margin=args.margin)
+        template = make(
+            args.amplitudes, args.periods,
+            duration=args.duration, margin=args.margin, bend=args.bend,
+        )  # fmt: skip
         if args.adapt:
             template = paper.adapt(template, robot, rate=args.rate)
     excitation = make_excitation(

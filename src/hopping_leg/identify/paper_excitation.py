@@ -5,6 +5,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
@@ -21,6 +22,8 @@ LAB_MARGIN = 0.005
 _SHRINK = 0.95
 _SMALLEST = 0.005
 
+Bend = Literal["backward", "forward"]
+
 
 @dataclass(frozen=True)
 class Stroke:
@@ -36,6 +39,8 @@ class Stroke:
     swing: float | None
     duration: float
     margin: float = 0.0
+    bend: Bend = "backward"
+    """Side of the knee: negative angles are backward."""
     rig: recording_format.Rig = "fixed-base"
 
     def __post_init__(self) -> None:
@@ -52,9 +57,11 @@ class Stroke:
         theta = np.zeros_like(time)
         if self.swing is not None:
             theta = -np.pi / 2 * np.cos(self._phase(time, self.swing))
-        foot = distance[:, None] * np.stack([np.cos(theta), np.sin(theta)], axis=-1)
+        side = 1.0 if self.bend == "backward" else -1.0
+        forward = side * distance * np.sin(theta)
+        foot = np.stack([distance * np.cos(theta), forward], axis=-1)
         angles = np.where((distance > 0)[:, None], kinematics.joint_angles(robot, foot), np.nan)
-        return np.unwrap(angles, axis=0)
+        return side * np.unwrap(angles, axis=0)
 
     def __str__(self) -> str:
         swing = "" if self.swing is None else f", T2 {self.swing:g} s"
@@ -101,6 +108,7 @@ def fixed_base(
     *,
     duration: float = DURATION,
     margin: float = 0.0,
+    bend: Bend = "backward",
     rig: recording_format.Rig = "fixed-base",
 ) -> Strokes:
     """Return the paper's fixed-base trajectory: the foot strokes while the leg swings.
@@ -115,7 +123,7 @@ def fixed_base(
         )
     grid = list(itertools.product(zip(amplitudes, periods, strict=True), swings))
     length = duration / len(grid)
-    parts = tuple(Stroke(a, t1, t2, length, margin, rig) for (a, t1), t2 in grid)
+    parts = tuple(Stroke(a, t1, t2, length, margin, bend, rig) for (a, t1), t2 in grid)
     slowest = max(max(part.period, part.swing or 0.0) for part in parts)
     if len(grid) > 1 and length < slowest - 1e-9:
         raise UsageError(
