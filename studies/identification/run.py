@@ -7,7 +7,8 @@ from pathlib import Path
 
 from hopping_leg.cli.options import JsonFile, at_least, show_table
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.identify.result import software_versions
+from hopping_leg.identify.result import LIBRARIES
+from hopping_leg.io import versions
 from hopping_leg.robot.parameters import JOINTS
 from studies.identification.arm import coverage
 from studies.identification.known import FIXED, HOPPING, METHODS, RAIL, paper_size, synthetic
@@ -118,7 +119,7 @@ class Identify(Study):
             result["paper_size"] = {"rows": rows}
         if "recordings" in self.parts and folder is not None:
             result["recordings"] = real(self, Path(folder))
-        result |= {"bars": bars(result), "versions": software_versions()}
+        result |= {"bars": bars(result), "versions": versions(*LIBRARIES)}
         show_table(
             ("what", "bar", "measured", "unit", "reached"),
             (

@@ -5,7 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from hopping_leg.identify.result import Identified, software_versions
+from hopping_leg.identify.result import LIBRARIES, Identified
+from hopping_leg.io import versions
 from studies.shared import Row, once
 
 
@@ -34,7 +35,7 @@ class Study:
 
     def once(self, name: str, asked: Row, work: Callable[..., Row], *arguments: object) -> Row:
         """Return the kept result of the same work by the same software, or do it and keep it."""
-        asked = {**asked, "software": software_versions()}
+        asked = {**asked, "software": versions(*LIBRARIES)}
         return once(self.out / f"{name}.json", asked, work, self, *arguments)
 
     def asked(self, search: str, seconds: float) -> Row:

@@ -11,7 +11,7 @@ import numpy as np
 from hopping_leg import io
 from hopping_leg.arrays import BoolArray, IntArray
 from hopping_leg.cli.options import Heights, JsonFile, at_least, say
-from hopping_leg.controllers import Controller, RolloutConfig, rollout
+from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.command_schedule import command_range
 from hopping_leg.controllers.registry import ENERGY_SHAPING, MPC_TRUE_STATE, load_controller
 from hopping_leg.controllers.rollout import Rollout
@@ -113,17 +113,14 @@ def try_out(source: str, name: str, commands: Sequence[float], seconds: float, n
     """Let a controller hop on the leg of a robot file at each command; return the pairs."""
     robot, believed = load_robot(source), believed_of(source)
     config = RolloutConfig(robot, disturbance_of(robot, noise), threads=1)
-    controller, heights = _load(name, believed), trials.scaled(commands, believed)
+    controller = load_controller(name, believed, simulated=True)
+    heights = trials.scaled(commands, believed)
     shown = np.clip(heights, *command_range(controller, believed))
     schedule = np.tile(shown, (round(seconds * config.rate), 1))
     run = rollout(controller, config, schedule, _SEED)
     where = {"controller": name, "disturbance": noise, "robot": Path(source).stem}
     pairs = [pair(run, leg, command, robot) for leg, command in enumerate(heights)]
     return {"pairs": [{**where, **row} for row in pairs]}
-
-
-def _load(name: str, believed: Robot) -> Controller:
-    return load_controller(name, believed, simulated=True)
 
 
 def summarize(pairs: Sequence[Row]) -> list[Row]:
@@ -239,7 +236,7 @@ class ZeroShot:
     def _trial(self, source: str, name: str, noise: Noise) -> tuple[Any, ...]:
         believed = believed_of(source)
         asked = {
-            "controller": fingerprint(_load(name, believed)),
+            "controller": fingerprint(load_controller(name, believed, simulated=True)),
             "robot": load_robot(source).digest,
             "believed": believed.digest,
             "commands": self.commands,

@@ -29,7 +29,7 @@ ERRORS = ("on held-out data, rms", "before: hip", "knee", "after: hip", "knee", 
 """What is shown of each kind of error."""
 _QUALITY = ("hip_before", "knee_before", "hip_after", "knee_after")
 _SHARES = ("load_friction", "ramp")
-_LIBRARIES = ("hopping-leg", "mujoco", "numpy", "scipy", "cma", "polars")
+LIBRARIES = ("hopping-leg", "mujoco", "numpy", "scipy", "cma", "polars")
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def as_json(identified: Identified, posterior: int = 0) -> dict[str, Any]:
         ],
         "split": identified.split,
         "seed": identified.seed,
-        "versions": software_versions(),
+        "versions": versions(*LIBRARIES),
     }
     if posterior:
         tree["posterior"] = {
@@ -240,11 +240,6 @@ def shown_errors(identified: Identified) -> list[tuple[str, ...]]:
     return rows
 
 
-def software_versions() -> dict[str, str]:
-    """Return the versions that the numbers may depend on."""
-    return versions(*_LIBRARIES)
-
-
 def save_robot(identified: Identified, path: Path, origin: str | Path) -> None:
     """Write the robot file; it stands alone, and an existing file is replaced as a whole.
 
@@ -299,7 +294,7 @@ def provenance(identified: Identified) -> list[str]:
         for use, some in (("Fitted to", identified.fit), ("Judged by", identified.held))
         for recording in some
     ]
-    libraries = ", ".join(f"{name} {value}" for name, value in software_versions().items())
+    libraries = ", ".join(f"{name} {value}" for name, value in versions(*LIBRARIES).items())
     how = f"{identified.plan.search}, {identified.split}, seed {identified.seed}"
     return [*lines, f"{how}; {libraries}."]
 

@@ -119,15 +119,9 @@ class PPO(Learner):
             self._train(rollout)
             self.logger.record("rollout/reward", float(rollout.rewards.mean()))
 
+    @torch.no_grad()
     def _collect(self) -> Rollout:
-        began = time.monotonic()
-        with torch.no_grad():
-            rollout = self._act()
-        self.seconds["rollouts"] += time.monotonic() - began
-        return rollout
-
-    def _act(self) -> Rollout:
-        task, config = self.task, self.config
+        began, task, config = time.monotonic(), self.task, self.config
         first, last = config.log_std
         std = math.exp(first + (last - first) * min(1.0, self.share / config.log_std_until))
         noise = torch.randn((config.n_steps, task.count, 2), generator=self._draws)
@@ -147,12 +141,14 @@ class PPO(Learner):
             ticks.append((seen, action, reward, torch.from_numpy(ended.astype(np.float32))))
         observations, actions, rewards, ends = map(torch.stack, zip(*ticks, strict=True))
         none = [np.empty((0, states[0].shape[1]), np.float32)]
-        return Rollout(
+        rollout = Rollout(
             observations, torch.from_numpy(np.stack(states)), actions, noise, rewards, ends,
             torch.from_numpy(np.concatenate(finals or none)),
             torch.from_numpy(np.concatenate(truncated or [np.empty(0, np.float32)])),
             torch.tensor(std),
         )  # fmt: skip
+        self.seconds["rollouts"] += time.monotonic() - began
+        return rollout
 
     def _train(self, rollout: Rollout) -> None:
         began, config = time.monotonic(), self.config

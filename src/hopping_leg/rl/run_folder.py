@@ -68,7 +68,8 @@ class RunFolder:
 
     def check_same(self) -> None:
         """Raise ``UsageError`` that names what else the run in the folder was asked for."""
-        stored = _read_json(self.path / "config.json")
+        file = self.path / "config.json"
+        stored = parse_json(file.read_bytes(), str(file))
         for key in _ASKED:
             if stored.get(key) != self.config[key]:
                 raise UsageError(
@@ -101,10 +102,6 @@ def read_result(path: Path) -> dict[str, Any]:
         raise UsageError(
             f"{path} holds no finished run; repeat the command that began it, with --resume."
         )
-    return _read_json(file)
-
-
-def _read_json(file: Path) -> dict[str, Any]:
     return parse_json(file.read_bytes(), str(file))
 
 
