@@ -144,8 +144,13 @@ class Trainer:
         return self._earlier + time.monotonic() - self._began
 
     def restore(self, tree: dict[str, Any]) -> None:
-        """Go on from a checkpoint."""
-        self.learner.restore(tree["learner"])
+        """Go on from a checkpoint; UsageError says that another version wrote it."""
+        try:
+            self.learner.restore(tree["learner"])
+        except (KeyError, RuntimeError, ValueError) as error:
+            raise errors.UsageError(
+                f"{self.folder.path} was begun by another version; train anew in another folder."
+            ) from error
         self.selection.rows, self.stages = tree["history"], tree["stages"]
         self._earlier = tree["elapsed"]
         self._began = time.monotonic()
