@@ -14,6 +14,7 @@ import gymnasium
 import mujoco
 import numpy as np
 import numpy.typing as npt
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
@@ -28,14 +29,24 @@ from hopping_leg.robot import DEFAULT_ROBOT, Robot, build_model, load_robot
 
 Image = npt.NDArray[np.uint8]
 
-_LARGEST = float(np.finfo(np.float32).max)
-
 
 class _TaskView:
     """What both environments are: a task, its spaces, its pictures, and whether it was seeded."""
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 200}  # noqa: RUF012
     np_random: np.random.Generator
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How it was made, with the episode's length in steps, which wrappers ask for."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        if spec is not None and spec.max_episode_steps is None:
+            spec.max_episode_steps = self.task.episode_steps
+        self._spec = spec
 
     def _open(
         self, robot: Robot | str, count: int, options: TaskConfig, reward: Reward | None,
@@ -49,8 +60,8 @@ class _TaskView:
         self.metadata = {**type(self).metadata, "render_fps": round(options.rate)}
         terms, rng = reward or paper_reward(leg), np.random.default_rng(0)
         self.task = HoppingTask(leg, count, options, terms, rng, threads, autoreset=autoreset)
-        self._seeded = False
-        seen = Box(-_LARGEST, _LARGEST, (self.task.observation.size,), np.float32)
+        self._seeded, self._terms = False, [f"reward_{name}" for name in terms.names]
+        seen = Box(-np.inf, np.inf, (self.task.observation.size,), np.float32)
         return seen, Box(-1.0, 1.0, (2,), np.float32)
 
     @functools.cached_property
@@ -104,9 +115,9 @@ def _asked(options: dict[str, Any] | None, count: int) -> Array | None:
 class HoppingEnv(_TaskView, gymnasium.Env[Array32, Array32]):
     """One leg hopping to commanded heights.
 
-    ``info`` holds ``base_height`` and ``command``, that of the tick, m, ``reward_terms``, the
-    reward's unweighted terms by name, and, in a step that passes an in-flight apex, ``apex_height``
-    and ``apex_error`` (its height above the command), m.
+    ``info`` holds ``base_height`` and ``command``, that of the tick, m, ``reward_NAME``, each term
+    of the reward unweighted, and, in a step that passes an in-flight apex, ``apex_height`` and
+    ``apex_error`` (its height above the command), m.
 
     The robot may be a name or the path of a TOML file; the reward, of which the environment takes a
     copy, is the paper's if None; the render mode is ``"rgb_array"`` or None, else a UsageError.
@@ -138,11 +149,8 @@ class HoppingEnv(_TaskView, gymnasium.Env[Array32, Array32]):
     def step(self, action: Array32) -> tuple[Array32, float, bool, bool, dict[str, Any]]:
         """Act for one control period; UsageError refuses an action that is not two numbers."""
         step = self.task.step(np.asarray(action)[None])
-        info: dict[str, Any] = {
-            "base_height": step.height.item(),
-            "command": step.command.item(),
-            "reward_terms": dict(zip(self.task.reward.names, step.terms[0].tolist(), strict=True)),
-        }
+        info = dict(zip(self._terms, step.terms[0].tolist(), strict=True))
+        info |= {"base_height": step.height.item(), "command": step.command.item()}
         if not math.isnan(apex_height := step.apex_height.item()):
             info["apex_height"], info["apex_error"] = apex_height, step.apex_error.item()
         ended = step.terminated.item(), step.truncated.item()
@@ -152,9 +160,7 @@ class HoppingEnv(_TaskView, gymnasium.Env[Array32, Array32]):
         """Return a picture from the side, (480, 640, 3), in mode ``"rgb_array"``."""
         return None if self.render_mode is None else self._picture()
 
-    def close(self) -> None:
-        """Free the renderer."""
-        self.close_extras()
+    close = _TaskView.close_extras
 
 
 class HoppingVectorEnv(_TaskView, gymnasium.vector.VectorEnv[Array32, Array32, Any]):
@@ -169,11 +175,6 @@ class HoppingVectorEnv(_TaskView, gymnasium.vector.VectorEnv[Array32, Array32, A
     Raises:
         UsageError: The mode of rendering or autoreset is unknown, or an episode has no steps.
     """
-
-    metadata: dict[str, Any] = {  # noqa: RUF012
-        **_TaskView.metadata,
-        "autoreset_mode": AutoresetMode.NEXT_STEP,
-    }
 
     def __init__(
         self,
@@ -197,7 +198,7 @@ class HoppingVectorEnv(_TaskView, gymnasium.vector.VectorEnv[Array32, Array32, A
             robot, num_envs, options, reward, render_mode, threads,
             autoreset=mode is AutoresetMode.SAME_STEP,
         )  # fmt: skip
-        self.metadata["autoreset_mode"] = mode
+        self.autoreset_mode = self.metadata["autoreset_mode"] = mode
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._ended = np.zeros(num_envs, np.bool_)  # legs that wait for their next episode
@@ -249,10 +250,9 @@ class HoppingVectorEnv(_TaskView, gymnasium.vector.VectorEnv[Array32, Array32, A
 
     def _of_tick(self, step: Step, legs: BoolArray) -> dict[str, Any]:
         """Return rewards' terms and apexes of some legs."""
-        terms = dict(zip(self.task.reward.names, step.terms.T.copy(), strict=True))
+        terms = dict(zip(self._terms, step.terms.T.copy(), strict=True))
         apexes = {"apex_height": step.apex_height.copy(), "apex_error": step.apex_error.copy()}
-        info = self._masked({"reward_terms": self._masked(terms, legs)}, legs)
-        return info | self._masked(apexes, legs & ~np.isnan(step.apex_height))
+        return self._masked(terms, legs) | self._masked(apexes, legs & ~np.isnan(step.apex_height))
 
     @staticmethod
     def _masked(values: dict[str, Any], mask: BoolArray) -> dict[str, Any]:

@@ -74,7 +74,7 @@ class RewardTerm(NamedTuple):
     """A line of a reward."""
 
     name: str
-    """Name in ``info["reward_terms"]``."""
+    """Name in ``info``, after ``reward_``."""
     weight: float | Callable[[float], float]
     """Factor of the term, negative for a penalty, or that factor at a share of the training."""
     function: Callable[[Transition], Array | float]

@@ -106,7 +106,7 @@ class HoppingTask(Stateful):
         self._scaling = sample_scaling(robot, options)
         self._take(robot, noise)
         grid = options.episode_grid
-        self._horizon = max(1, round(options.episode * options.rate / grid)) * grid
+        self.episode_steps = max(1, round(options.episode * options.rate / grid)) * grid
         self._never, self._nan = np.zeros(count, np.bool_), np.full(count, np.nan)
         for constant in (self._never, self._nan):
             constant.flags.writeable = False
@@ -177,7 +177,7 @@ class HoppingTask(Stateful):
         self._begin(rows, command)
         if ids is None and self.options.random_episode_start:
             grid = self.options.episode_grid
-            periods = self._rng.integers(1, self._horizon // grid + 1, self.count)
+            periods = self._rng.integers(1, self.episode_steps // grid + 1, self.count)
             self._end[:] = self._tick + periods * grid
             self._plan()
         return self._see_anew(rows)
@@ -312,7 +312,7 @@ class HoppingTask(Stateful):
         self.command[rows] = self._draw_commands(rows) if command is None else command
         height, q = self._initial_states.draw(rows, self.command[rows], self._rng)
         self.legs.place(rows, height, q)
-        self._end[rows] = self._tick + self._horizon
+        self._end[rows] = self._tick + self.episode_steps
         self.last_action[rows], self._rises[rows], self._since_apex[rows] = 0.0, False, 0.0
         self.reward.restart(rows)
         self._switch[rows] = np.iinfo(np.int64).max
