@@ -1,7 +1,6 @@
 """What one process holds at a time, and gives back when it ends, however that is."""
 
 import contextlib
-import fcntl
 import os
 import tempfile
 from collections.abc import Iterator
@@ -13,8 +12,6 @@ from hopping_leg.errors import Error
 from hopping_leg.io import safe_file_name
 
 FOLDER_LOCK = ".lock"  # Name of the file that says who works in a folder
-
-_MASTERS = ("/dev/ptmx", "/dev/pts/ptmx")
 
 
 def named_lock(name: str, what: str, error: Error) -> BaseFileLock:
@@ -49,6 +46,8 @@ class DeviceLock:
     """Holds a device, which no other process may have open, until ``close``."""
 
     def __init__(self, path: Path, error: Error) -> None:
+        import fcntl  # POSIX alone has it
+
         try:
             self._descriptor = os.open(path, os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError as problem:
@@ -76,7 +75,7 @@ def _holders(terminal: int) -> Iterator[str]:
         with contextlib.suppress(OSError):  # it ended, or is another user's
             opened = {str(entry.readlink()) for entry in (process / "fd").iterdir()}
             own = process.name == str(os.getpid())
-            if sought in opened and not own and not opened.intersection(_MASTERS):
+            if sought in opened and not own and not opened & {"/dev/ptmx", "/dev/pts/ptmx"}:
                 words = (process / "cmdline").read_bytes() or (process / "comm").read_bytes()
                 name = words.decode(errors="replace").replace("\0", " ").strip()
                 yield f"process {process.name} ({name[:80]})"

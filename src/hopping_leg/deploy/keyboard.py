@@ -6,9 +6,7 @@ import re
 import select
 import stat
 import sys
-import termios
 import threading
-import tty
 from collections.abc import Callable, Iterator
 
 from hopping_leg.controllers.command_schedule import Range
@@ -70,6 +68,9 @@ def keys(
     if not (terminal or stat.S_ISFIFO(kind) or stat.S_ISSOCK(kind)):
         yield
         return
+    import termios  # POSIX alone has both
+    import tty
+
     over = threading.Event()
 
     def listen() -> None:

@@ -54,7 +54,7 @@ _SWITCH_SECONDS = 1e-4
 
 def prefer_this_thread() -> str | None:
     """Give the calling thread real-time priority; return a notice where that is not permitted."""
-    return None if _schedule(0, os.SCHED_FIFO, _PRIORITY) else _NOTICE
+    return None if _schedule(0, "SCHED_FIFO", _PRIORITY) else _NOTICE
 
 
 def prefer_this_process() -> str | None:
@@ -63,19 +63,19 @@ def prefer_this_process() -> str | None:
     One thread is not enough: whichever holds the interpreter must not be preempted either. New
     threads inherit it.
     """
-    return None if _schedule_all(os.SCHED_FIFO, _PRIORITY) else _NOTICE
+    return None if _schedule_all("SCHED_FIFO", _PRIORITY) else _NOTICE
 
 
-def _schedule_all(policy: int, priority: int) -> bool:
-    threads = [int(entry.name) for entry in Path("/proc/self/task").iterdir()]
+def _schedule_all(policy: str, priority: int) -> bool:
+    threads = [int(task.name) for task in Path("/proc/self/task").glob("*")] or [0]
     done = [_schedule(thread, policy, priority) for thread in threads]
     return all(done)
 
 
-def _schedule(thread: int, policy: int, priority: int) -> bool:
+def _schedule(thread: int, policy: str, priority: int) -> bool:
     try:
-        os.sched_setscheduler(thread, policy, os.sched_param(priority))
-    except OSError as error:
+        os.sched_setscheduler(thread, getattr(os, policy), os.sched_param(priority))
+    except (OSError, AttributeError) as error:  # macOS has none of it
         return isinstance(error, ProcessLookupError)
     return True
 
@@ -137,6 +137,6 @@ def keeping_time() -> Iterator[tuple[str, ...]]:
         with processors_awake() as asleep, uninterrupted():
             yield tuple(notice for notice in (*notices, asleep) if notice)
     finally:
-        _schedule_all(os.SCHED_OTHER, 0)
+        _schedule_all("SCHED_OTHER", 0)
         with contextlib.suppress(OSError, AttributeError):
             ctypes.CDLL(None).munlockall()

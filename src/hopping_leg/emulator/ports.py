@@ -2,8 +2,6 @@
 
 import contextlib
 import os
-import termios
-import tty
 from abc import ABC, abstractmethod
 from pathlib import Path
 
@@ -129,9 +127,11 @@ class PtyPort(LinePort):
 
     def plug_in(self) -> None:
         """Offer a new terminal."""
+        import tty  # POSIX alone has it
+
         master, self._slave = os.openpty()
         for descriptor in (master, self._slave):
-            tty.setraw(descriptor, termios.TCSANOW)
+            tty.setraw(descriptor)
         os.set_blocking(master, False)
         self._terminal = Path(os.ttyname(self._slave))
         self.connect(master)
