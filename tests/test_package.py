@@ -54,7 +54,8 @@ def test_the_container_is_built_by_the_commands_of_the_readme():
     assert not read_options(View, "hop demo", None, call[1:]).browser
 
 
-def test_the_installed_version_is_that_of_project_changelog_and_citation():
+def test_the_installed_version_is_that_of_project_changelog_and_citation_and_pins_no_other():
+    assert "==" not in f"{PROJECT['dependencies'], PROJECT['optional-dependencies']}", "beside it"
     assert importlib.metadata.version("hopping-leg") == PROJECT["version"]
     assert f"## {PROJECT['version']}" in (ROOT / "CHANGELOG.md").read_text()
     yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
