@@ -103,8 +103,8 @@ def readable(header):
 
 def description(form):
     def read(path):
-        made = imported_robot(read_leg(path), path.name, ("qdd100",))
-        build_model(robot_from_tree(made.tree, path.name))
+        tree, _ = imported_robot(read_leg(path), path.name, ("qdd100",))
+        build_model(robot_from_tree(tree, path.name))
 
     leg = load_robot("legv2")
     spec = get_spec(leg)

@@ -20,7 +20,7 @@ LEG = to_urdf(load_robot("legv2"))
 def made(path, text, motors=("qdd100",), values=(), names=()):
     """Return the tables of a robot file that an XML text describes."""
     path.write_text(text)
-    return imported_robot(read_leg(path, *names), str(path), motors, dict(values)).tree
+    return imported_robot(read_leg(path, *names), str(path), motors, dict(values))[0]
 
 
 def imported(*args, **options):
@@ -106,10 +106,8 @@ def test_a_leg_comes_back_from_what_is_exported_of_it(tmp_path, name, form):
     robot, spec = load_robot(name), get_spec(load_robot(name))
     spec.compile()
     armatures = {f"{joint}.armature": getattr(robot, joint).armature for joint in JOINTS}
-    if form == "urdf":  # URDF does not know them
-        other = imported(tmp_path / "leg.urdf", to_urdf(robot), values=armatures)
-    else:
-        other = imported(tmp_path / "leg.xml", spec.to_xml())  # MuJoCo writes six digits
+    text, values = (to_urdf(robot), armatures) if form == "urdf" else (spec.to_xml(), {})
+    other = imported(tmp_path / "leg.xml", text, values=values)  # MuJoCo writes six digits
     assert_same_motion(robot, other, np.random.default_rng(0), rtol=1e-4)
     np.testing.assert_allclose(other.of_joints("armature"), robot.of_joints("armature"), rtol=1e-4)
     assert (other.rail, other.foot) == (robot.rail, robot.foot)
@@ -129,11 +127,10 @@ def test_mjcf_is_read_with_defaults_degrees_and_without_its_meshes(tmp_path):
     </body></body></body></worldbody>
     <actuator><motor joint="hip" gear="2" ctrlrange="-5 5"/></actuator></mujoco>"""
     robot = imported(tmp_path / "leg.xml", text)
-    assert robot.thigh.length == pytest.approx(0.2)
-    assert (robot.shank.length, robot.foot.radius) == pytest.approx((0.18, 0.012))
+    lengths = robot.thigh.length, robot.shank.length, robot.foot.radius
+    assert (*lengths, robot.hip.torque_limit) == pytest.approx((0.2, 0.18, 0.012, 10))
     assert (robot.hip.stop_lower, robot.hip.stop_upper) == pytest.approx(np.radians([-45, 90]))
     assert (robot.knee.stop_lower, robot.knee.stop_upper) == pytest.approx(np.radians([-140, 0]))
-    assert robot.hip.torque_limit == pytest.approx(10)
 
 
 def test_what_mass_lies_beside_a_link_is_told_and_its_inertia_about_the_joint_kept(tmp_path):
@@ -165,17 +162,15 @@ def test_what_is_given_goes_before_the_file_and_the_file_before_the_motor(tmp_pa
         (LEG.replace('"knee" type="revolute"', '"knee" type="fixed"'), (), "are: 'hip'."),
         (LEG.replace("0 -1 0", "0 0 1"), (), "are not level"),
         (LEG.replace('xyz="0 0 -0.15"', 'xyz="0 0 0"'), (), "turn about one axis"),
+        (EXAMPLE.replace("0 0 -0.165", "0 0.03 0"), (), "stand foot, lower_leg, below it only the"),
         (LEG, ("hp",), "--hip: There is no hinge 'hp'. Did you mean 'hip'?"),
         (LEG.replace('<child link="shank"', '<child link="shin"'), (), "MuJoCo reads"),
         (LEG.replace('value="0.11794"', 'value="heavy"'), (), "Element 'mass'"),
         (LEG.replace('radius="0.01"', 'radius="nan"'), (), "nan size"),
         ('<mujoco><include file="/etc/passwd"/></mujoco>', (), "Include error"),
-        (
-            '<mujoco><asset><mesh name="m"/></asset><worldbody><body name="a"><joint/>'
-            '<geom type="mesh" mesh="m"/></body></worldbody></mujoco>',
-            (),
-            "body 'a' weighs what its mesh 'm' weighs",
-        ),
+        ('<mujoco><asset><mesh name="m"/></asset><worldbody><body name="a"><joint/>'
+         '<geom type="mesh" mesh="m"/></body></worldbody></mujoco>',
+         (), "body 'a' weighs what its mesh 'm' weighs"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_read_is_said_with_what_was_found(tmp_path, text, names, sentence):
@@ -193,9 +188,14 @@ def test_a_urdfs_mesh_without_inertial_weighs_nothing(tmp_path):
     mesh = '<collision><geometry><mesh filename="a.stl"/></geometry></collision>'
     text = EXAMPLE.replace('<link name="stand"/>', f'<link name="stand">{mesh}</link>')
     leg = imported(tmp_path / "leg.urdf", text)
-    masses = (leg.base.mass, leg.thigh.mass, leg.shank.mass)
-    assert masses == pytest.approx((0.42 + 0.49, 0.31 + 0.485, 0.13 + 0.018))
+    assert (leg.base.mass, leg.thigh.mass, leg.shank.mass) == pytest.approx((0.91, 0.795, 0.148))
     assert (leg.thigh.length, leg.shank.length, leg.foot.radius) == (0.17, 0.165, 0.014)
+
+
+def test_a_foot_that_the_file_does_not_say_is_as_far_from_the_knee_as_is_given(tmp_path):
+    text = EXAMPLE.replace("0 0 -0.165", "0 0.03 0")
+    leg = imported(tmp_path / "leg.urdf", text, names=(None, None, None, 0.2))
+    assert (leg.shank.length, leg.shank.com) == (0.2, pytest.approx(0.07 * 0.13 / 0.148, rel=1e-3))
 
 
 def test_joints_that_are_not_the_legs_are_held_and_named(tmp_path):

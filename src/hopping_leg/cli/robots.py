@@ -60,7 +60,7 @@ class Import:
     knee: str | None = None
     """Knee's joint; default: found likewise."""
     foot: str | None = None
-    """Link, body, site or geom at the centre of the foot; default: found likewise."""
+    """Link, body, site or geom at the foot's centre; default: found, or at `--set shank.length`."""
     motor: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ()
     """Motor of both joints, or the hip's and the knee's: qdd100, ak80-9 or ak80-6."""
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=NUMBER ...")] = ()
@@ -128,15 +128,15 @@ def _import(args: Import) -> None:
     if out.exists():
         raise UsageError(f"{out} exists and is not replaced; remove it, or give another --out.")
     values = importing.read_values(args.set)
-    leg = read_leg(args.description, args.hip, args.knee, args.foot)
-    made = importing.imported_robot(leg, str(args.description), args.motor, values)
-    robot = robot_files.robot_from_tree(made.tree, str(out))
+    leg = read_leg(args.description, args.hip, args.knee, args.foot, values.get("shank.length"))
+    tree, comment = importing.imported_robot(leg, str(args.description), args.motor, values)
+    robot = robot_files.robot_from_tree(tree, str(out))
     build_model(robot)
-    write_atomically(out, robot_files.robot_text(made.tree, made.comment).encode())
-    entries = dict(numbers(made.tree))
-    say(*made.comment.splitlines())
-    for path, why in made.assumed.items():
-        say(f"Assumed: {path} = {entries[path]['value']:g} {entries[path]['unit']} ({why})")
+    write_atomically(out, robot_files.robot_text(tree, comment).encode())
+    say(*comment.splitlines())
+    for path, entry in numbers(tree):
+        if (why := entry["source"]).startswith("assumed: "):
+            say(f"Assumed: {path} = {entry['value']:g} {entry['unit']} ({why[9:]})")
     say(f"Wrote {out}: {robot.name} ({_summary(robot)}).")
     say(*(f"But {doubt}" for doubt in robot_files.doubts(out)))
 

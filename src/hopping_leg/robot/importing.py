@@ -5,7 +5,6 @@ In this order: what the user gives, what the file states, what the named motor h
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from hopping_leg.errors import RobotError, UsageError, unknown_name
@@ -41,16 +40,6 @@ _ASSUMED: dict[str, Entry] = {
 }
 
 
-@dataclass(frozen=True)
-class ImportedRobot:
-    """Tables of a robot file, and what was assumed in them."""
-
-    tree: Tree
-    comment: str
-    assumed: dict[str, str]
-    """Why, by path."""
-
-
 def read_values(words: tuple[str, ...]) -> dict[str, float]:
     """Return numbers given as ``path=value``, ``motor.X`` for both joints, or raise UsageError."""
     valid, values = _units(), dict[str, float]()
@@ -83,8 +72,8 @@ def _units() -> dict[str, str]:
 
 def imported_robot(
     leg: PlanarLeg, origin: str, motors: tuple[str, ...] = (), values: Mapping[str, float] = {}
-) -> ImportedRobot:
-    """Return a robot file's tables for a leg that the file ``origin`` describes.
+) -> tuple[Tree, str]:
+    """Return a robot file's tables and comment for a leg that the file ``origin`` describes.
 
     Values are numbers that the user gives, by their path in a robot file, SI units; motors are one
     of ``MOTORS`` for both joints, or the hip's and the knee's. RobotError says which numbers are
@@ -95,9 +84,9 @@ def imported_robot(
     for joint in JOINTS:
         entries |= _motor_limits(joint, entries)
     entries |= given
-    units, assumptions = _units(), _assumptions(entries)
-    assumed = {p: assumptions[p][1] for p in units if p not in entries and p in assumptions}
-    entries |= {path: (assumptions[path][0], f"assumed: {why}") for path, why in assumed.items()}
+    units = _units()
+    assumed = {p: (v, f"assumed: {why}") for p, (v, why) in _assumptions(entries).items()}
+    entries = assumed | entries
     unknown = (path for path in units if path not in entries and not path.startswith("hardware."))
     missing = [f"{path} ({units[path]})" for path in unknown if not path.endswith(".armature")]
     if missing:
@@ -116,7 +105,7 @@ def imported_robot(
         "down, positive swings the foot forward; knee 0 is straight, negative bends it.\n"
         f"In the coordinates of {file}:\n"
     )
-    return ImportedRobot(tree, comment + "\n".join(leg.notes), assumed)
+    return tree, comment + "\n".join(leg.notes)
 
 
 def _motor_numbers(names: tuple[str, ...]) -> dict[str, Entry]:
@@ -133,8 +122,8 @@ def _motor_numbers(names: tuple[str, ...]) -> dict[str, Entry]:
         entries = {f"{joint}.motor.{key}": entry for key, entry in tree[its]["motor"].items()}
         drive = tree.get("hardware", {}).get(its, {})
         entries |= {f"hardware.{joint}.{key}": entry for key, entry in drive.items()}
-        for path, entry in entries.items():
-            found[path] = entry["value"], f"{name} as in {robot}: {entry['source']}"
+        said = f"{name} as in {robot}: "
+        found |= {path: (e["value"], said + e["source"]) for path, e in entries.items()}
     return found
 
 
@@ -171,10 +160,8 @@ def _assumptions(known: Mapping[str, Entry]) -> dict[str, Entry]:
         if not low <= soft[0] < soft[1] <= high:
             soft, why = (low + inset, high - inset), f"{inset:.2g} rad inside the stop"
         found |= {f"{joint}.{end}": (soft[i], why) for i, end in enumerate(("lower", "upper"))}
-        torque, peak = (
-            known.get(f"{at}.{key}", (0.0,))[0] for key in ("torque_limit", "peak_torque")
-        )
-        if most := peak or torque:
+        limit = known.get(f"{at}.torque_limit", (0.0,))
+        if most := known.get(f"{at}.peak_torque", limit)[0] or limit[0]:
             found[f"{at}.torque_limit"] = most, "the peak torque"
             found[f"{at}.peak_torque"] = most, "the torque limit; a motor may give more"
             found[f"{at}.rated_torque"] = _RATED_SHARE * most, "the qdd100's share of its peak"

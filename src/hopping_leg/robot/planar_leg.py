@@ -33,6 +33,7 @@ _HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
 _TURN = 2 * np.pi
 _PARALLEL = 0.02  # sine of the angle up to which two directions are one
 _SAME_PLACE = 2e-3  # m, up to which two points are one
+_THROUGH = "where the line from the knee through the shank's centre of mass ends"
 _BENT = 0.1  # rad, beyond which a range or a posture tells to which side a knee bends
 
 
@@ -49,12 +50,14 @@ class PlanarLeg:
 
 
 def read_leg(
-    path: Path, hip: str | None = None, knee: str | None = None, foot: str | None = None
-) -> PlanarLeg:
+    path: Path, hip: str | None = None, knee: str | None = None,
+    foot: str | None = None, shank_length: float | None = None,
+) -> PlanarLeg:  # fmt: skip
     """Return the leg that a URDF or MJCF file describes.
 
     Hip and knee are the file's names of joints, the foot that of the body, site or geom at the
-    centre of its sphere; by default they are found by structure and usual names.
+    centre of its sphere; by default they are found by structure and usual names. A foot of no name
+    lies ``shank_length``, m, from the knee, through the shank's centre of mass.
 
     RobotError says that the file cannot be read, that a part is missing or ambiguous, or that the
     leg moves in no vertical plane.
@@ -67,7 +70,7 @@ def read_leg(
     rail = next(vertical, None)
     moving = tree.subtree(0 if rail is None else body_of[rail])
     leg, shank = (tree.subtree(body_of[joint]) for joint in joints)
-    tip = _foot(tree, foot, shank, lower)
+    tip = _foot(tree, foot, shank, lower, shank_length)
     ends = np.stack([data.xanchor[upper], data.xanchor[lower], tip.position])
     normal, flat = _plane(tree, joints, ends)
     lines = np.diff(ends, axis=0) @ flat.T
@@ -87,6 +90,7 @@ def read_leg(
     hinges = (i for i in range(tree.model.njnt) if body_of[i] in moving)
     held = ", ".join(tree.joint(i) for i in hinges if i not in (*joints, rail))
     notes = [f"  hip = {hip_angle}", f"  knee = {knee_angle}"]
+    notes += [f"The foot is {tip.name}."] if tip.name == _THROUGH else []
     notes += [f"{tree.loops} equality constraints are left out."] if tree.loops else []
     notes += [f"Joints held in the zero posture: {held}."] if held else []
     numbers = {
@@ -142,8 +146,10 @@ def _hip_and_knee(tree: Description, hip: str | None, knee: str | None) -> tuple
     return pair
 
 
-def _foot(tree: Description, name: str | None, shank: set[int], knee: int) -> Point:
-    """Return the foot's centre: the point of a name, else of a usual one, else a sphere."""
+def _foot(
+    tree: Description, name: str | None, shank: set[int], knee: int, length: float | None
+) -> Point:
+    """Return its centre: the point of a name, else a usual one, a sphere, one at the length."""
     points = tree.points(shank)
     likely = [point for point in points if _FOOT.search(point.name)] or points
     if name is not None:
@@ -155,14 +161,21 @@ def _foot(tree: Description, name: str | None, shank: set[int], knee: int) -> Po
 
     candidates = [point for point in likely if far(point) > _SAME_PLACE]
     foot = max(candidates, key=lambda point: (point.radius > 0, far(point)), default=None)
-    if foot is None:
-        found = ", ".join(sorted({point.name for point in points}))
-        raise RobotError(
-            f"{tree.origin} does not say where the foot is: below the knee stand {found}; name the"
-            " centre of its sphere with --foot, or add a frame there (in URDF a link 'foot' on a"
-            " fixed joint, in MJCF a site)."
-        )
-    return foot
+    if foot is not None:
+        return foot
+    knees, axis, bodies = tree.data.xanchor[knee], tree.data.xaxis[knee], tree.heavy(shank)
+    masses = tree.model.body_mass[bodies]
+    line = masses @ (tree.data.xipos[bodies] - knees) / max(masses.sum(), 1e-9)
+    line -= (line @ axis) * axis
+    com = float(np.linalg.norm(line))
+    if length and com > _SAME_PLACE:
+        return Point(_THROUGH, knees + length / com * line, 0.0)
+    found = ", ".join(sorted({point.name for point in points}))
+    raise RobotError(
+        f"{tree.origin} does not say where the foot is: on the knee's axis stand {found}, below it"
+        f" only the shank's centre of mass, {com:.3g} m away; give the foot's distance through it,"
+        " e.g. --set shank.length=0.2, or add a frame at its centre and name it with --foot."
+    )
 
 
 def _aside(tree: Description, joint: int, vector: Array) -> float:
