@@ -99,10 +99,9 @@ def _bag() -> None:
     from hopping_leg.identify.play_excitation import play
 
     leg = load_robot("legv2")
-    recording = play(make_excitation(Multisine(duration=12.0), leg), leg, believed="legv2")
-    recording.save(Path("bag.parquet"))
-    Path("bag.mcap").write_bytes(to_mcap(Trace.load(Path("bag.parquet"))))
-    Path("bag.parquet").rename("bag.toml").write_text(
+    made = play(make_excitation(Multisine(duration=12.0), leg), leg, believed="legv2").trace
+    Path("bag.mcap").write_bytes(to_mcap(made))
+    Path("bag.toml").write_text(
         'rig = "fixed-base"\nrate_hz = 200.0\nrobot = "legv2"\nsource = "made up"\n'
         'onboard = "zoh"\nstiffness = [20.0, 12.0]\ndamping = [0.3, 0.15]\n'
     )

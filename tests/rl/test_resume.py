@@ -64,8 +64,7 @@ def test_only_whole_checkpoints_count_two_are_kept_and_no_code_in_them_runs(tmp_
 
 def test_a_run_is_never_overwritten_or_mixed(tmp_path, monkeypatch):
     try_briefly(monkeypatch)
-    out = tmp_path / "run"
-    recipe = TINY.replace(steps=64, eval_every=32, learning_starts=32)
+    recipe, out = TINY.replace(steps=64, eval_every=32, learning_starts=32), tmp_path / "run"
     done = module.train(recipe, ROBOT, 0, out, quiet=True)
     content = done.policy.read_bytes()
     for seed, resume, says in ((0, 0, "--resume"), (0, 1, "finished"), (1, 1, "another seed")):
