@@ -115,12 +115,12 @@ def store(file: Path, command: str) -> None:
 
 
 def condensed(tree: Any) -> Any:  # noqa: ANN401
-    """Return JSON values without long lists of numbers, and numbers to six digits."""
+    """Return JSON values without long lists of numbers, and numbers to five digits."""
     if isinstance(tree, dict):
         return {key: condensed(entry) for key, entry in tree.items() if not _raw(entry)}
     if isinstance(tree, list):
         return [condensed(entry) for entry in tree]
-    return float(f"{tree:.6g}") if isinstance(tree, float) else tree
+    return float(f"{tree:.5g}") if isinstance(tree, float) else tree
 
 
 def _raw(entry: object) -> bool:

@@ -25,6 +25,7 @@ _OF_CONTROLLERS = {
     "energy-shaping": "#D55E00",
     "fast": "#009E73",
     "universal": "#CC79A7",
+    "energy-shaping-tuned": "#56B4E9",
     "energy-shaping-flying": "#E69F00",
     "energy-shaping-literal": "#8C510A",
     "mpc-true-state": "#8A7A00",

@@ -13,8 +13,8 @@ Examples:
 """
 
 RESULTS = (
-    "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping "
-    "--twins 20 --seed 6000 --disturbance on off --jobs 2 "
+    "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping-tuned "
+    "energy-shaping --twins 30 --seed 6000 --disturbance on off --jobs 2 "
     "--out runs/zero-shot-twins --json studies/sim_to_real/results/zero_shot_twins.json",
     "python -m studies.time_to_accuracy --recipes universal --seeds 0 1 2 "
     "--out runs/time_to_accuracy && "
@@ -24,15 +24,15 @@ RESULTS = (
     "--disturbance off --jobs 2 --out runs/zero-shot-seeds "
     "--json studies/sim_to_real/results/zero_shot_seeds.json",
     "hop robots draw legs --count 50 --seed 6000 --out runs/legs && "
-    "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping "
-    "--folder runs/legs --jobs 2 --out runs/zero-shot-legs "
+    "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping-tuned "
+    "energy-shaping --folder runs/legs --jobs 2 --out runs/zero-shot-legs "
     "--json studies/sim_to_real/results/zero_shot_legs.json",
     "python -m studies.sim_to_real transfer --methods universal-identified universal "
-    "energy-shaping energy-shaping-tuned --jobs 2 "
+    "energy-shaping-identified --jobs 2 "
     "--folder runs/transfer-universal --json studies/sim_to_real/results/universal.json",
     *(
         "python -m studies.sim_to_real transfer --methods identified-belt identified cad table-1 "
-        "randomised energy-shaping --steps 300000 "
+        "randomised --steps 300000 "
         f"--disturbance {noise} --jobs 2 --folder runs/transfer-fast "
         f"--json studies/sim_to_real/results/fast_noise_{noise}.json"
         for noise in ("on", "off")

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hopping_leg.controllers.registry import ENERGY_SHAPING
+from hopping_leg.controllers.registry import ENERGY_SHAPING, ENERGY_SHAPING_TUNED
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.rl.recipes import Randomise
 
@@ -48,7 +48,12 @@ METHODS = {
         Method("truth", "true parameters: what a perfect fit would find", truth=True),
         Method(ENERGY_SHAPING, "energy shaping, shipped gains", untrained=ENERGY_SHAPING),
         Method(
-            "energy-shaping-tuned",
+            ENERGY_SHAPING_TUNED,
+            "energy shaping, tuned on other twins",
+            untrained=ENERGY_SHAPING_TUNED,
+        ),
+        Method(
+            "energy-shaping-identified",
             "energy shaping, tuned on what both recordings identify",
             fitted=True,
             untrained=ENERGY_SHAPING,
@@ -65,15 +70,17 @@ METHODS = {
 }
 """Every method by name."""
 
-DEFAULT = ("identified", "cad", "table-1", "randomised", ENERGY_SHAPING)
+DEFAULT = ("identified", "cad", "table-1", "randomised")
 """What policies are trained on, and what they hop beside, unless asked otherwise."""
 
 
 def choose_methods(names: Sequence[str]) -> tuple[Method, ...]:
-    """Return methods by name, each once, energy shaping among them; UsageError without any."""
+    """Return methods by name, each once, and both energy shapings; UsageError without any."""
     for name in names:
         if name not in METHODS:
             raise UsageError(unknown_name("method", name, METHODS))
     if not names:
         raise UsageError(f"No method is left; name some of: {', '.join(METHODS)}.")
-    return tuple(METHODS[name] for name in dict.fromkeys((*names, ENERGY_SHAPING)))
+    return tuple(
+        METHODS[name] for name in dict.fromkeys((*names, ENERGY_SHAPING, ENERGY_SHAPING_TUNED))
+    )

@@ -13,7 +13,12 @@ from hopping_leg.arrays import BoolArray, IntArray
 from hopping_leg.cli.options import Heights, JsonFile, at_least, say
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.command_schedule import command_range
-from hopping_leg.controllers.registry import ENERGY_SHAPING, MPC_TRUE_STATE, load_controller
+from hopping_leg.controllers.registry import (
+    ENERGY_SHAPING,
+    ENERGY_SHAPING_TUNED,
+    MPC_TRUE_STATE,
+    load_controller,
+)
 from hopping_leg.controllers.rollout import Rollout
 from hopping_leg.deploy.drive_link import DriveMode, Reply
 from hopping_leg.deploy.safety_limits import hopping_limits
@@ -139,7 +144,7 @@ def summarize(pairs: Sequence[Row]) -> list[Row]:
             "pairs": len(own),
             **_shares(own),
             "closer_than_energy_shaping": _closer(own, pairs, ENERGY_SHAPING),
-            "closer_than_tuned": _closer(own, pairs, "energy-shaping-tuned"),
+            "closer_than_tuned": _closer(own, pairs, ENERGY_SHAPING_TUNED),
             "median_abs_error_m": float(np.median(errors)),
             "worst_abs_error_m": max(errors),
             "median_std_m": float(np.median(stds)) if stds else None,
@@ -179,7 +184,7 @@ def _place(row: Row) -> tuple[str, float, str]:
 class ZeroShot:
     """Let controllers hop on legs that they have never met: drawn twins, or a folder's robots."""
 
-    controllers: tuple[str, ...] = ("universal", ENERGY_SHAPING)
+    controllers: tuple[str, ...] = ("universal", ENERGY_SHAPING, ENERGY_SHAPING_TUNED)
     """Names or files of controllers; each is told the robot that a twin's file extends."""
     twins: int = 100
     """How many twins to draw."""

@@ -10,10 +10,11 @@ from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.energy_shaping.gains import GainFile, load_gains, scale_gains
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
+from hopping_leg.sim.randomization import draw_twin
 from studies.energy_shaping import run as module
 from studies.energy_shaping import tune
 from studies.energy_shaping.run import COMMANDS, RANGE, Baseline, cases
-from studies.energy_shaping.tune import Tune, calibrated, cost, from_unit, to_unit
+from studies.energy_shaping.tune import ON_TWINS, SPACE, Tune, calibrated, from_unit, to_unit
 from studies.shared import main
 
 ROBOT = load_robot("legv2-paper")
@@ -53,23 +54,28 @@ def test_errors_are_those_of_the_papers_heights_and_faults_those_of_all():
 
 
 def scores(shift=0.0, scale=1.0, **changed):
-    usual = tune.CommandScore(0.3, 0.3, 0.002, 2.0, 0.4, 0.03, 0.08)
+    usual = tune.CommandScore(0.3, 0.3, 0.002, 2.0, 0.0, 0.4, 0.03, 0.08)
     medians = {c: 0.3 + shift + scale * (c - 0.3) for c in Tune().commands}
     return [replace(usual, **{"command": c, "median": m} | changed) for c, m in medians.items()]
 
 
-def test_unit_cube_round_trip_and_shipped_gains_lie_in_the_box():
-    point = np.linspace(0.1, 0.9, len(tune.SPACE))
-    np.testing.assert_allclose(to_unit(from_unit(point, GAINS)), point)
-    assert vars(from_unit(to_unit(GAINS), GAINS)) == pytest.approx(vars(GAINS))
+@pytest.mark.parametrize(("space", "name"), [(SPACE, None), (ON_TWINS, "energy-shaping-tuned")])
+def test_unit_cube_round_trip_and_shipped_gains_lie_in_the_box(space, name):
+    point, gains = np.linspace(0.1, 0.9, len(space)), load_gains(name).gains if name else GAINS
+    np.testing.assert_allclose(to_unit(from_unit(point, gains, space), space), point)
+    assert vars(from_unit(to_unit(gains, space), gains, space)) == pytest.approx(vars(gains))
 
 
 def test_cost_ignores_what_calibration_removes_and_counts_the_rest():
-    assert cost(scores(shift=0.02, scale=0.9)) == pytest.approx(cost(scores()))
-    for worse in ({"std": 0.010}, {"rate": 0.5}, {"knee_clearance": -0.01}):
-        assert cost(scores(**worse)) > cost(scores()) + 7, worse
-    assert cost(scores(median=float("nan"))) > 100
-    assert cost(scores(flight=0.3), 0.5) == pytest.approx(cost(scores()) + 20)
+    alone, many = Tune().cost, Tune(twins=2).cost
+    assert alone(scores(shift=0.02, scale=0.9)) == pytest.approx(alone(scores()))
+    assert many(scores(scale=0.5)) == pytest.approx(2 * many(scores())), "it is stretched"
+    for cost in (alone, many):
+        for worse in ({"std": 0.010}, {"rate": 0.5}, {"knee_clearance": -0.01}):
+            assert cost(scores(**worse)) > cost(scores()) + 7, worse
+        assert cost(scores(median=float("nan"))) > 100
+    assert many(scores(skipped=0.1)) == pytest.approx(many(scores()) + 10)
+    assert Tune(flight=0.5).cost(scores(flight=0.3)) == pytest.approx(alone(scores()) + 20)
     found = calibrated(GAINS, scores(shift=0.01, scale=1.1))
     assert found.height_scale == pytest.approx(1.1 * GAINS.height_scale)
     assert found.height_offset == pytest.approx(0.01 + 1.1 * GAINS.height_offset)
@@ -79,7 +85,7 @@ def scored_by_exponent(monkeypatch):
     """Let no leg hop: an exponent of 1 is best; return the seeds of noise and delay, live."""
     seeds = []
 
-    def scored(candidates, setup, commands, seconds, seed):
+    def scored(candidates, setup, commands, seconds, seed, legs):
         seeds.append(seed)
         return [scores(std=abs(g.exponent - 1.0) + 0.001) for g in candidates]
 
@@ -101,9 +107,18 @@ def test_a_search_goes_down_and_on_where_it_was(tmp_path, monkeypatch):
 def test_candidates_are_judged_side_by_side():
     useless = replace(GAINS, k0=0.3, exponent=0.0)
     commands = (0.25, 0.30, 0.35)
-    good, bad = tune.evaluate([GAINS, useless], SETUP, commands, 3.5, 0)
-    assert cost(good) < cost(bad)
+    good, bad = tune.evaluate([GAINS, useless], SETUP, commands, 3.5, 0, [ROBOT])
+    assert Tune().cost(good) < Tune().cost(bad)
     assert tuple(score.command for score in good) == commands
+
+
+def test_a_set_of_legs_is_hopped_on_at_once_and_what_differs_between_them_is_scatter():
+    light = replace(ROBOT, base=replace(ROBOT.base, mass=0.7 * ROBOT.base.mass))
+    (alone,) = tune.evaluate([GAINS], SETUP, (0.3,), 3.5, 0, [ROBOT])
+    (mixed,) = tune.evaluate([GAINS], SETUP, (0.3,), 3.5, 0, [ROBOT, light])
+    assert mixed[0].std > alone[0].std
+    drawn = Tune(robot="legv2", twins=2, seed=500).legs
+    assert drawn == tuple(draw_twin(seed).robot for seed in (500, 501))
 
 
 def test_the_command_writes_gains_that_say_how_they_were_found(tmp_path, monkeypatch):

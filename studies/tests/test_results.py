@@ -64,7 +64,7 @@ def test_what_is_stored_is_without_raw_numbers(tmp_path):
         "trials": 9,
         "rows": [{"a": 0.123456789, "names": ["x"] * 99}],
     }
-    assert condensed(raw) == {"trials": 9, "rows": [{"a": 0.123457, "names": ["x"] * 99}]}
+    assert condensed(raw) == {"trials": 9, "rows": [{"a": 0.12346, "names": ["x"] * 99}]}
     file = tmp_path / "e.json"
     file.write_text(json.dumps(raw))
     store(file, "hop evaluate")

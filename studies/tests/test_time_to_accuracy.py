@@ -86,7 +86,7 @@ def test_snapshots_of_stable_baselines3_come_at_equal_times_until_the_minutes_ar
 @pytest.fixture
 def tiny(monkeypatch, tmp_path):
     """Return what makes a study of small recipes in a folder; ``trained`` are their trainings."""
-    monkeypatch.setattr(module, "LEARNT", {"fast": SHORT, "paper": TINY.replace(eval_every=400)})
+    monkeypatch.setattr(module, "RECIPES", {"fast": SHORT, "paper": TINY.replace(eval_every=400)})
     monkeypatch.setattr(module, "SHARES", {"fast": (0.5, 1.0)})
     try_briefly(monkeypatch)
     train = module.train

@@ -80,6 +80,15 @@ def test_shares_are_of_all_pairs_and_hops_and_closeness_is_pair_by_pair():
     assert (undisturbed["disturbance"], undisturbed["within_10mm"]) == ("off", 0)
 
 
+def test_the_readme_says_who_is_closer():
+    stored = json.loads(
+        (shared.ROOT / "studies/sim_to_real/results/zero_shot_twins.json").read_text()
+    )
+    on = {r["controller"]: r for r in stored["summary"] if r["disturbance"] == "on"}
+    assert on["universal"]["closer_than_tuned"] < 0.5
+    assert on["universal"]["median_std_m"] > on["energy-shaping-tuned"]["median_std_m"]
+
+
 def test_the_command_writes_pairs_and_summary_and_goes_on(tmp_path, capsys):
     robots = tmp_path / "robots"
     draw_twin(1).save(robots / "twin-1.toml")

@@ -7,7 +7,7 @@ them. All policies are judged on seeds that chose nothing, at the heights and on
 were trained for.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
@@ -30,19 +30,6 @@ from studies.time_to_accuracy import sb3
 JUDGING_SEEDS = (1000, 1001)
 """Seeds of noise and delay that chose nothing."""
 
-LEARNT = {
-    **RECIPES,
-    "paper-ppo": replace(
-        RECIPES["paper"],
-        name="paper-ppo",
-        algorithm=RECIPES["rl"].algorithm,
-        network=RECIPES["rl"].network,
-        schedule=RECIPES["rl"].schedule,
-        selection=replace(RECIPES["paper"].selection, eval_every=10**9),
-    ),
-}
-"""The recipes, and what `rl` learns from the paper's reward: how high that lets a leg hop."""
-
 SHARES = {"fast": (0.25, 0.5, 1.0)}
 """Shares of the recipe's steps, for recipes whose schedules end with them."""
 
@@ -53,8 +40,8 @@ _SPACING = 0.02
 class TimeToAccuracy:
     """Train recipes and stable-baselines3's algorithms from scratch; judge them over time."""
 
-    recipes: tuple[str, ...] = ("rl", "fast", "paper", "paper-ppo", *sb3.ALGORITHMS)
-    """Recipes, paper-ppo, sb3-ppo and sb3-sac."""
+    recipes: tuple[str, ...] = ("rl", "fast", "paper", *sb3.ALGORITHMS)
+    """Recipes, sb3-ppo and sb3-sac."""
     seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
     """One training each."""
     robot: str | None = None
@@ -73,7 +60,7 @@ class TimeToAccuracy:
         spent: list[Row] = []
         for recipe in self.recipes:
             asked = {"robot": self._robot(recipe).digest, "minutes": self.minutes}
-            asked |= {"options": repr(LEARNT.get(recipe)), "shares": SHARES.get(recipe)}
+            asked |= {"options": repr(RECIPES.get(recipe)), "shares": SHARES.get(recipe)}
             for seed in self.seeds:
                 file = self.out / "judged" / f"{recipe}-{seed}.json"
                 found = once(file, asked, self._train, recipe, seed)
@@ -102,7 +89,7 @@ class TimeToAccuracy:
                 {"seconds": s.seconds, "steps": s.steps, **judge(s.content, robot)} for s in found
             ]
             return {"rows": rows, "spent": {}}
-        rows, result, whole = [], {}, LEARNT[recipe]
+        rows, result, whole = [], {}, RECIPES[recipe]
         for share in SHARES.get(recipe, (1.0,)):
             folder = self.out / f"{recipe}-{seed}" / f"{share:g}"
             if not (folder / "policy.onnx").exists():
@@ -121,7 +108,7 @@ class TimeToAccuracy:
         return {"rows": rows, "spent": result["seconds"]}
 
     def _robot(self, recipe: str) -> Robot:
-        usual = LEARNT[recipe].robot if recipe in LEARNT else DEFAULT_ROBOT
+        usual = RECIPES[recipe].robot if recipe in RECIPES else DEFAULT_ROBOT
         return load_robot(self.robot or usual)
 
 

@@ -15,6 +15,9 @@ from hopping_leg.sim import CONTROL_RATE
 ENERGY_SHAPING = "energy-shaping"
 """The baseline, tuned on the leg of its gain file."""
 
+ENERGY_SHAPING_TUNED = "energy-shaping-tuned"
+"""The same, tuned on drawn twins, for a leg that nobody tuned it on."""
+
 _FLYING = "energy-shaping-flying"  # tuned to fly half of the time, as is asked of policies
 _LITERAL = "energy-shaping-literal"  # the paper's law and gains as printed
 
@@ -24,7 +27,7 @@ MPC_TRUE_STATE = "mpc-true-state"
 ROBOT_FILE = "robot.toml"
 """The robot of a training, in the folder of its policy."""
 
-_BUILT_IN = (ENERGY_SHAPING, _FLYING, _LITERAL, MPC_TRUE_STATE)
+_BUILT_IN = (ENERGY_SHAPING, ENERGY_SHAPING_TUNED, _FLYING, _LITERAL, MPC_TRUE_STATE)
 _SHIPPED = resources.files("hopping_leg") / "policies"
 
 

@@ -2,11 +2,10 @@
 
 import itertools
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from hopping_leg.arrays import Array, BoolArray, IntArray
+from hopping_leg.arrays import Array, BoolArray, IntArray, Stateful
 from hopping_leg.errors import UsageError
 from hopping_leg.sim.compiled import compiled
 
@@ -70,7 +69,7 @@ class Measurement:
     age: Array
 
 
-class Channel:
+class Channel(Stateful):
     """Between the legs and their controller: noise on both ways, delay on the way in.
 
     Every tick calls ``samples``, then ``actuate`` once. Noisy samples enter a buffer of the last
@@ -78,6 +77,8 @@ class Channel:
     ``period`` is the control period, s. Legs that are not ``disturbed``, (n,), have no noise and no
     delay.
     """
+
+    STATE = ("_buffer", "_draws", "_torque_noise", "_tick", "rng")
 
     def __init__(
         self,
@@ -92,7 +93,6 @@ class Channel:
         depth = disturbance.delay_buffer
         self._orders = np.array(list(itertools.combinations(range(depth), SAMPLES)))
         self._buffer = np.zeros((depth, count, 5))
-        self._parts = [(slot[:, 0:2], slot[:, 2:4], slot[:, 4]) for slot in self._buffer]
         self._back = np.zeros((count, SAMPLES))
         self._block = min(max(_BLOCK_SIZE // count, 16), 512)
         self._draws = np.empty((self._block, count, _DRAWS))
@@ -120,8 +120,8 @@ class Channel:
         Shapes are (n, 2) for ``q``, rad, and ``qd``, rad/s, and (n,) for the heights ``command``,
         m. Again in a tick, the noise is the same.
         """
-        positions, velocities, commands = self._parts[self._tick % len(self._parts)]
-        positions[:], velocities[:], commands[:] = q, qd, command
+        newest = self._buffer[self._tick % len(self._buffer)]
+        newest[:, 0:2], newest[:, 2:4], newest[:, 4] = q, qd, command
         samples, disturbance = np.empty((self.count, SAMPLES, 5)), self.disturbance
         _disturb(
             self._draws, self._buffer, self._orders, self._tick, disturbance.joint_noise,
@@ -142,28 +142,8 @@ class Channel:
             self._draw()
         return disturbed
 
-    def state(self) -> dict[str, Any]:
-        """Return everything needed to go on exactly from here, as arrays and plain values."""
-        return {
-            "buffer": self._buffer.copy(),
-            "draws": self._draws.copy(),
-            "tick": self._tick,
-            "rng": self.rng.bit_generator.state,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on from a ``state``."""
-        self._buffer[:] = state["buffer"]
-        self._draws[:] = state["draws"]
-        self._tick = int(state["tick"])
-        self.rng.bit_generator.state = state["rng"]
-        self._set_torque_noise()
-
     def _draw(self) -> None:
         self.rng.random(out=self._draws)
-        self._set_torque_noise()
-
-    def _set_torque_noise(self) -> None:
         noise = self.disturbance.torque_noise * self._share[:, None]
         self._torque_noise = 1 + noise * (2 * self._draws[..., 6:8] - 1)
 
