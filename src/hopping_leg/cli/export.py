@@ -66,8 +66,8 @@ def run(args: Urdf | Policy | Traces) -> None:
         show_table(("entry", "value"), facts.items(), f"policy {policy.name}")
         save_json(args.json, facts)
         if args.out:
-            write_atomically(args.out, policy.content)
-            say_written(args.out)
+            policy.save(args.out)
+            say_written(args.out, args.out.with_suffix(".json"))
     elif args.out:
         write_atomically(args.out, to_urdf(load_robot(args.robot)).encode())
         say_written(args.out)

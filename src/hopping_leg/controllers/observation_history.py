@@ -6,7 +6,7 @@ policy's graph, so that a policy file needs nothing but encoders and a command.
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -33,6 +33,15 @@ class ObservationHistory(Stateful, ABC):
     """As stored in policy files."""
     shapes: ClassVar[dict[str, tuple[int, ...]]]
     """Graph inputs, in the order in which the network sees them, without the leading n."""
+    units: ClassVar[dict[str, str]] = {
+        "q": "rad", "qd": "rad/s", "age": "s", "past_torque": "N m", "command": "m",
+        FULL_TORQUE: "N m",
+    }  # fmt: skip
+    """Of graph inputs; those not named have none."""
+    ticks_ago: ClassVar[dict[str, tuple[int, ...]]] = {}
+    """Ticks before now of an input's rows, where they are the same ones at every tick."""
+    limit: ClassVar[str] = "It is not told how old its samples are."
+    """What is known to be asked of who runs such a policy, or to be missing."""
 
     def __init__(self, period: float) -> None:
         self.period = period
@@ -41,6 +50,15 @@ class ObservationHistory(Stateful, ABC):
     def network_inputs(self) -> tuple[str, ...]:
         """Graph inputs that the network sees; the full torque scales what it gives."""
         return tuple(name for name in self.shapes if name != FULL_TORQUE)
+
+    @classmethod
+    def describe(cls) -> dict[str, Any]:
+        """Return shape, unit and ticks of every graph input, as JSON values."""
+        return {
+            name: {"shape": ["n", *shape], "unit": cls.units.get(name, "1")}
+            | ({"ticks_ago": list(cls.ticks_ago[name])} if name in cls.ticks_ago else {})
+            for name, shape in cls.shapes.items()
+        }
 
     def set_robots(self, robots: Sequence[Robot]) -> None:
         """Say what is believed of the legs: a robot each, or one of all."""
@@ -99,6 +117,10 @@ def _dated_shapes(
     }
 
 
+def _ticks_ago(lags: tuple[int, ...], torque_lags: tuple[int, ...]) -> dict[str, tuple[int, ...]]:
+    return {"q": lags, "qd": lags, "past_torque": tuple(lag + 1 for lag in torque_lags)}
+
+
 class Dated(ObservationHistory):
     """Samples at fixed times before now, however late they came, and the policy's own torques.
 
@@ -114,6 +136,8 @@ class Dated(ObservationHistory):
     TORQUE_LAGS: ClassVar[tuple[int, ...]] = (0, 1, 2, 4, 6)
     """Ticks before the last action of the torques."""
     shapes: ClassVar[dict[str, tuple[int, ...]]] = _dated_shapes(LAGS, TORQUE_LAGS)
+    ticks_ago: ClassVar[dict[str, tuple[int, ...]]] = _ticks_ago(LAGS, TORQUE_LAGS)
+    limit: ClassVar[str] = "It needs the age of every sample, which the paper's 15 inputs lack."
     STATE = ("_track", "_torques", "_command", "_fresh")
 
     def __init__(self, period: float) -> None:
@@ -176,6 +200,7 @@ class DatedLong(Dated):
     )  # fmt: skip
     TORQUE_LAGS: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64)
     shapes: ClassVar[dict[str, tuple[int, ...]]] = _dated_shapes(LAGS, TORQUE_LAGS)
+    ticks_ago: ClassVar[dict[str, tuple[int, ...]]] = _ticks_ago(LAGS, TORQUE_LAGS)
 
 
 class AnyLeg(Dated):
@@ -206,6 +231,10 @@ class AnyLeg(Dated):
         "robot": (robot_numbers.COUNT,),
         FULL_TORQUE: (2,),
     }
+    units: ClassVar[dict[str, str]] = {"q": "rad", FULL_TORQUE: "N m"}
+    ticks_ago: ClassVar[dict[str, tuple[int, ...]]] = {
+        **Dated.ticks_ago, "foot": Dated.LAGS, "foot_velocity": Dated.LAGS,
+    }  # fmt: skip
 
     _numbers: Array | None = None
 

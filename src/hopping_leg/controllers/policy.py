@@ -1,10 +1,12 @@
 """A trained policy: an ONNX graph from raw joint measurements to joint torques.
 
-The file is self-contained: normalisation and torque scaling are inside the graph; recipe, robot,
-layout, control rate and command range are in its metadata. It runs through onnxruntime alone.
+The file is self-contained: normalisation and torque scaling are inside the graph, its contract
+(robot, inputs with units, control rate, command range, known limits) is in its metadata, and as JSON
+beside it for other runtimes. It runs through onnxruntime alone.
 """
 
 import hashlib
+import importlib
 import json
 import os
 import threading
@@ -22,7 +24,7 @@ from hopping_leg.controllers.observation_history import (
     make_observation_history,
 )
 from hopping_leg.errors import PolicyError, UsageError
-from hopping_leg.io import parse_json, read_dataclass
+from hopping_leg.io import Tree, parse_json, plain, read_dataclass, write_atomically, write_json
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.channel import Measurement
 
@@ -86,6 +88,13 @@ and zeros at first."""
 INPUTS = ("hip position", "knee position", "hip velocity", "knee velocity")
 """What a card's ``input_low`` and ``input_high`` bound."""
 
+_SUM = "policy_sha256"  # Entry by which a contract is known
+
+_OF_LAYOUT = ("inputs", "outputs", "limit_of_inputs")  # What a contract tells besides the card
+
+_CONVERTER = "hopping_leg.rl.foreign"
+"""What makes policies of other networks; the training's packages are needed for that alone."""
+
 _ROUNDING = 1e-9
 _MOST_RATE = 1e4  # Hz
 _MARGIN = 0.25  # Share of its range of inputs by which they may lie beyond it
@@ -122,6 +131,8 @@ class Card:
     rad, then their velocities, rad/s; empty where nothing was stored."""
     input_high: tuple[float, ...] = ()
     """Largest of the same."""
+    known_limits: tuple[str, ...] = ()
+    """What is known to fail, a sentence each."""
 
     def __post_init__(self) -> None:
         bounds = {len(self.input_low), len(self.input_high)}
@@ -132,9 +143,20 @@ class Card:
                 "A policy's card holds numbers that none has; export the policy again."
             )
 
+    def contract(self) -> Tree:
+        """Return the card with the layout's inputs, their units and limit, as JSON values."""
+        history = type(make_observation_history(self.layout, 1 / self.rate))
+        about = {
+            "inputs": history.describe(),
+            "outputs": {"torque": {"shape": ["n", 2], "unit": "N m"}},
+            "limit_of_inputs": history.limit,
+        }
+        contract: Tree = plain({"schema": SCHEMA, **asdict(self), **about})
+        return contract
+
     def to_json(self) -> str:
-        """Return the card as stored in the file."""
-        return json.dumps({"schema": SCHEMA, **asdict(self)}, sort_keys=True)
+        """Return the contract as stored in the file."""
+        return json.dumps(self.contract(), sort_keys=True)
 
     @staticmethod
     def from_json(text: str, origin: str) -> "Card":
@@ -145,7 +167,18 @@ class Card:
             raise PolicyError(
                 f"{origin} is of schema {schema}; this version reads schema {SCHEMA}."
             )
-        return read_dataclass(Card, values, origin, error=PolicyError)
+        told = {name: values.pop(name) for name in _OF_LAYOUT if name in values}
+        card = read_dataclass(Card, values, origin, error=PolicyError)
+        for name, value in told.items():
+            if value != card.contract()[name]:
+                raise PolicyError(
+                    f"{origin} tells other {name} than layout '{card.layout}' has in this version."
+                )
+        return card
+
+
+class NoCardError(PolicyError):
+    """An ONNX file has no card."""
 
 
 class Policy:
@@ -165,7 +198,7 @@ class Policy:
         except UnicodeDecodeError as error:
             raise PolicyError(f"{origin} has a damaged policy card: it is no text.") from error
         if text is None:
-            raise PolicyError(
+            raise NoCardError(
                 f"{origin} is an ONNX file but not a policy; make one with `hop train`."
             )
         self.card = Card.from_json(text, origin)
@@ -181,12 +214,44 @@ class Policy:
 
     @staticmethod
     def load(path: Path) -> "Policy":
-        """Read a file; PolicyError where it is missing, truncated, foreign or of another schema."""
+        """Read a policy, a stable-baselines3 .zip or an ONNX network trained on the environment.
+
+        PolicyError says that it is missing, truncated, foreign, of another schema, or not what the
+        contract beside it, ``NAME.json``, tells.
+        """
         try:
-            content = path.read_bytes()
+            content, origin = path.read_bytes(), str(path)
         except OSError as error:
             raise PolicyError(f"Cannot read policy file {path}: {error.strerror}.") from error
-        return Policy(content, str(path), path.stem)
+        if path.suffix != ".zip":
+            try:
+                return Policy(content, origin, path.stem)._checked(path.with_suffix(".json"))
+            except NoCardError:
+                pass
+        converter = importlib.import_module(_CONVERTER)
+        return Policy(converter.convert(content, path), origin, path.stem)
+
+    def save(self, path: Path) -> None:
+        """Write the policy and, beside it, its contract as JSON."""
+        write_atomically(path, self.content)
+        write_json(path.with_suffix(".json"), self.contract())
+
+    def contract(self) -> Tree:
+        """Return the card's contract, and the file's SHA-256 and memory, as JSON values."""
+        memory = {"memory": self._memory_size} if self._memory_size else {}
+        return {_SUM: hashlib.sha256(self.content).hexdigest(), **memory, **self.card.contract()}
+
+    def _checked(self, beside: Path) -> "Policy":
+        """Return the policy; PolicyError where a contract beside its file tells something else."""
+        told = parse_json(beside.read_bytes(), str(beside)) if beside.is_file() else {}
+        own = self.contract()
+        wrong = [name for name in own if told.get(name) != own[name]] if _SUM in told else []
+        if wrong:
+            raise PolicyError(
+                f"{beside} is not the contract of {self.origin}: '{wrong[-1]}' differs; take both"
+                " files from where they were written, or remove the contract."
+            )
+        return self
 
     @property
     def inputs(self) -> dict[str, tuple[int, ...]]:
@@ -209,6 +274,11 @@ class Policy:
         card = self.card
         if self.for_any_leg or robot.has_digest(card.robot_digest):
             return ""
+        if not card.robot:
+            beside = Path(self.origin).with_suffix(".toml")
+            return (
+                f'Nothing says on which robot {name} was trained; write robot = "..." to {beside}.'
+            )
         return (
             f"{name} was trained on robot '{card.robot}' ({card.robot_digest}), not on"
             f" '{robot.name}' ({robot.digest})."

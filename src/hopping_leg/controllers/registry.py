@@ -24,6 +24,9 @@ _LITERAL = "energy-shaping-literal"  # the paper's law and gains as printed
 MPC_TRUE_STATE = "mpc-true-state"
 """Plans every push in the true state: in simulation alone."""
 
+POLICY_FILES = (".onnx", ".zip")
+"""How names of policies, and of networks of which they are made, end."""
+
 ROBOT_FILE = "robot.toml"
 """The robot of a training, in the folder of its policy."""
 
@@ -48,13 +51,18 @@ def load_policy(name_or_path: str | Path) -> Policy:
     name = str(name_or_path)
     if name in shipped_policies():
         return Policy((_SHIPPED / f"{name}.onnx").read_bytes(), f"shipped policy '{name}'", name)
-    if name.endswith(".onnx"):
+    if name.endswith(POLICY_FILES):
         return Policy.load(Path(name))
+    if name.endswith((".pt", ".pth", ".ts")):
+        raise PolicyError(
+            f"{name} is no policy, and what a file of torch's may run is not run here; give the"
+            " module to `hopping_leg.export_policy`, which writes one."
+        )
     if name.endswith((".urdf", ".xml")):
         words = shlex.join(["hop", "robots", "import", name])
         raise UsageError(f"{name} is no controller; make a robot file of it: {words}.")
     if Path(name).exists():
-        raise PolicyError(f"{name} is not a policy file; those end in .onnx.")
+        raise PolicyError(f"{name} is not a policy file; those end in {' or '.join(POLICY_FILES)}.")
     raise UsageError(
         unknown_name("controller", name, controller_names())
         + " Or give an .onnx file, or a Python class as path/to/file.py:CLASS."
@@ -69,7 +77,7 @@ def robot_of(controllers: Sequence[str]) -> str:
     """
     for text in controllers:
         name = text if Path(text).exists() else text.rpartition("=")[2]
-        if name in shipped_policies() or (name.endswith(".onnx") and Path(name).is_file()):
+        if name in shipped_policies() or (name.endswith(POLICY_FILES) and Path(name).is_file()):
             policy = load_policy(name)
             if not policy.for_any_leg:
                 return _robot_of_policy(policy.card, Path(name).with_name(ROBOT_FILE))
@@ -97,9 +105,9 @@ def load_controller(
 ) -> protocol.Controller:
     """Load a controller for a robot that it shall drive at a rate, Hz.
 
-    It is one of ``controller_names()``, an ``.onnx`` file, a gain file (``.toml``) for energy
-    shaping, or a Python class, see ``user_controllers``; of a ``simulated`` leg it may see the true
-    state.
+    It is one of ``controller_names()``, a file for ``Policy.load``, a gain file (``.toml``) for
+    energy shaping, or a Python class, see ``user_controllers``; of a ``simulated`` leg it may see
+    the true state.
 
     Raises:
         PolicyError: The file is missing, truncated or foreign, or does not fit the rate.

@@ -19,7 +19,9 @@ from torch import nn
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.observation_history import FULL_TORQUE, make_observation_history
 from hopping_leg.controllers.policy import MEMORY, METADATA_KEY, NEXT_MEMORY, Card
+from hopping_leg.envs import TaskConfig
 from hopping_leg.envs.observation import Observation
+from hopping_leg.robot import Robot
 
 _OPSET = 17
 _SPACING = 0.01
@@ -136,6 +138,15 @@ def build_policy(actor: Actor, observation: Observation, card: Card) -> bytes:
             dynamo=False,
         )
     return with_card(file.getvalue(), card)
+
+
+def make_card(robot: Robot, options: TaskConfig, recipe: str, **about: Any) -> Card:  # noqa: ANN401
+    """Return the card of a policy for a task, with more fields as named."""
+    return Card(
+        recipe, options.observation, *options.command_bounds,
+        (float(options.action_torque[0]), float(options.action_torque[1])),
+        robot.name, robot.digest, options.rate, **about,
+    )  # fmt: skip
 
 
 def with_card(content: bytes, card: Card) -> bytes:

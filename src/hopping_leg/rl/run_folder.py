@@ -142,7 +142,7 @@ step {1000 * TIMESTEP:g} ms, the first 2 s of each trial dropped. These seeds ch
 | command m | median error mm | std mm | hops/s | flight % | skipped | body contact ticks\
  | lowest base m |
 |---|---|---|---|---|---|---|---|
-{"".join(map(_row, selected["trials"]))}{missed_commands(selected["trials"])}"""
+{"".join(map(_row, selected["trials"]))}{_warning(missed_commands(selected["trials"]))}"""
 
 
 def _stages(rows: list[dict[str, Any]]) -> str:
@@ -169,19 +169,19 @@ def _row(trial: dict[str, Any]) -> str:
     return f"| {' | '.join(cells)} |\n"
 
 
-def missed_commands(trials: list[dict[str, Any]]) -> str:
-    """Return a paragraph on the commands that a policy misses in its own simulation, if any."""
+def missed_commands(trials: list[dict[str, Any]]) -> tuple[str, ...]:
+    """Return a sentence on the commands that a policy misses in its own simulation, if any."""
     missed = [
         f"{command:g} m ({'no hops' if error is None else f'{1000 * error:+.0f} mm'})"
         for command, error in ((t["command_m"], t["median_error_m"]) for t in trials)
         if error is None or abs(error) > MISSED
     ]
-    if not missed:
-        return ""
-    return f"""
-**Commands missed in its own simulation: {", ".join(missed)}.** Train longer or from another seed
-before this policy goes to any other leg.
-"""
+    return (f"Commands missed in its own simulation: {', '.join(missed)}.",) if missed else ()
+
+
+def _warning(missed: tuple[str, ...]) -> str:
+    more = "Train longer or from another seed\nbefore this policy goes to any other leg."
+    return f"\n**{missed[0]}** {more}\n" if missed else ""
 
 
 def _mm(metres: float | None) -> str:

@@ -11,8 +11,8 @@ from typing import Any
 import torch
 from stable_baselines3.common.logger import configure
 
-from hopping_leg import errors, io, locks
-from hopping_leg.controllers.policy import Card, Policy
+from hopping_leg import errors, locks
+from hopping_leg.controllers.policy import Policy
 from hopping_leg.envs import TaskLeg
 from hopping_leg.rl import onnx_export, reach, run_folder
 from hopping_leg.rl.checkpoint import write_checkpoint
@@ -178,7 +178,7 @@ class Trainer:
             "seconds": self.seconds | learner.seconds,
         }
         self.folder.write_result(result)
-        io.write_atomically(self.folder.policy, content)
+        Policy(content, "the selected policy", self.recipe.name).save(self.folder.policy)
         return Trained(self.folder.policy, minutes, steps)
 
     def _finish(self) -> tuple[bytes, dict[str, Any]]:
@@ -198,7 +198,8 @@ class Trainer:
         ranges = [input_range(policy, leg, heights, recipe.task.rate) for leg in legs]
         low = tuple(map(min, zip(*(least for least, _ in ranges), strict=True)))
         high = tuple(map(max, zip(*(most for _, most in ranges), strict=True)))
-        card = replace(policy.card, input_low=low, input_high=high)
+        missed = run_folder.missed_commands(selected["trials"])
+        card = replace(policy.card, input_low=low, input_high=high, known_limits=missed)
         return onnx_export.with_card(content, card), selected
 
     @contextmanager
@@ -241,22 +242,11 @@ class Trainer:
 
     def _content(self) -> bytes:
         """Return the deterministic policy as it stands, as a policy file."""
-        recipe, robot = self.recipe, self.robot
-        low, high = recipe.task.command_bounds
-        hip, knee = recipe.task.action_torque
-        card = Card(
-            recipe=recipe.name,
-            layout=recipe.task.observation,
-            command_low=low,
-            command_high=high,
-            torque_scale=(float(hip), float(knee)),
-            robot=robot.name,
-            robot_digest=robot.digest,
-            rate=recipe.task.rate,
-            seed=self.folder.config["seed"],
-            steps=int(self.learner.num_timesteps),
+        card = onnx_export.make_card(
+            self.robot, self.recipe.task, self.recipe.name,
+            seed=self.folder.config["seed"], steps=int(self.learner.num_timesteps),
             versions=self.folder.config["versions"],
-        )
+        )  # fmt: skip
         return onnx_export.build_policy(self.learner.network(), self.learner.task.observation, card)
 
     def _evaluate(self) -> None:
