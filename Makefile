@@ -24,7 +24,7 @@ $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
 	$(PIP) install $$(grep '^torch==' constraints.txt)
 	$(PIP) install -c constraints.txt hatchling editables
-	$(PIP) install -c constraints.txt --no-build-isolation -e '.[train,cluster,hardware,view,ros,docs,dev]'
+	$(PIP) install -c constraints.txt --no-build-isolation -e '.[train,cluster,hardware,view,video,ros,docs,dev]'
 	$(BIN)/hop doctor
 	@touch $@
 reproduce: $(STAMP)

@@ -23,7 +23,7 @@ ARGUMENTS = {"train_your_own": ["16384"], "custom_reward": ["1024"], "tune": ["1
 
 
 def simulated_ros(monkeypatch):
-    """Put a leg in the place of ROS 2, whose joint states are late in the end; return what it did."""
+    """Put a leg in the place of ROS 2, silent in the end; return its heights and efforts."""
     did, ends, leg = [], {}, LegSimulator(load_robot("legv2-identified"), 1, threads=1)
     leg.stand(slice(None), np.array([0.7, -1.4]))
     clock = SimpleNamespace(nanoseconds=0)

@@ -4,16 +4,13 @@ import itertools
 import math
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 
-from stable_baselines3 import PPO, SAC
 from tests.rl.learners import ROBOT, TINY, TINY_FAST, try_briefly
 
 from hopping_leg.controllers.policy import Policy
-from hopping_leg.envs import HoppingEnv
 from hopping_leg.rl.policy_evaluation import CommandResult
 from studies.time_to_accuracy import run as module
 from studies.time_to_accuracy import sb3
@@ -52,23 +49,6 @@ def test_points_in_time_are_averaged_over_seeds_in_their_order():
     assert second["worst_seed_mean_error_m"] == pytest.approx(0.3)
     assert second["mean_std_m"] == pytest.approx(0.1)
     assert second["skipped_hops"] == 7
-
-
-@pytest.mark.parametrize(("name", "algorithm"), [("sb3-ppo", PPO), ("sb3-sac", SAC)])
-def test_a_policy_file_of_stable_baselines3_acts_as_its_model_does(name, algorithm):
-    env = HoppingEnv(ROBOT)
-    model = algorithm("MlpPolicy", env, seed=0, device="cpu")
-    policy = Policy(sb3.policy_file(model, name, ROBOT, 0), name, name)
-    assert policy.card.robot == ROBOT.name
-    seen, _ = env.reset(seed=0)
-    policy.reset(1)
-    actions = []
-    for _ in range(20):
-        actions.append(model.predict(seen, deterministic=True)[0])
-        torque = policy.act(env.task.measurement)[0]
-        np.testing.assert_allclose(torque, actions[-1] * policy.card.torque_scale, atol=1e-4)
-        seen, *_ = env.step(np.random.default_rng(0).uniform(-1, 1, 2).astype(np.float32))
-    assert np.ptp(actions) > 1e-3
 
 
 def test_snapshots_of_stable_baselines3_come_at_equal_times_until_the_minutes_are_over(monkeypatch):

@@ -52,9 +52,9 @@ def test_missing_file_and_unknown_name(tmp_path):
         load_controller(tmp_path / "none.onnx", ROBOT)
     with pytest.raises(UsageError, match=r"'energy-shaping'.*path/to/file\.py:CLASS"):
         load_controller("energy-shapin", ROBOT)
-    (tmp_path / "weights.zip").write_bytes(b"PK")
+    (tmp_path / "weights.bin").write_bytes(b"PK")
     with pytest.raises(PolicyError, match=r"end in \.onnx"):
-        load_controller(tmp_path / "weights.zip", ROBOT)
+        load_controller(tmp_path / "weights.bin", ROBOT)
 
 
 def test_another_robot_is_named_and_another_rate_refused(file):

@@ -84,7 +84,7 @@ def test_a_card_names_every_command_that_its_own_simulation_misses():
             [{"command_m": int(name[1:]) / 1000, "median_error_m": e} for name, e in missed.items()]
         )
 
-    told = said(_225=0.235, _250=0.004, _300=-0.021, _350=None)
+    (told,) = said(_225=0.235, _250=0.004, _300=-0.021, _350=None)
     assert "0.225 m (+235 mm), 0.3 m (-21 mm), 0.35 m (no hops)" in told
     assert "0.25 m" not in told
-    assert said(_220=0.0, _250=MISSED, _300=-MISSED) == ""
+    assert said(_220=0.0, _250=MISSED, _300=-MISSED) == ()
