@@ -40,6 +40,7 @@ _LAYER = re.compile(
 _ELSE = re.compile(r"(actor\.)?log_std|actor_target\.|critic|.*value_net")
 """Weights of stable-baselines3's actors, and those that deterministic actions do not depend on."""
 
+_MOST = 1 << 29  # bytes of an actor
 _ACTIVATIONS = ("Tanh", "ReLU", "ELU", "LeakyReLU", "SiLU", "GELU", "Sigmoid")
 
 Act = Callable[[Any, torch.Tensor], torch.Tensor]
@@ -187,6 +188,8 @@ def _read_sb3(content: bytes, origin: str, size: int) -> DenseActor:
     """Return the actor of a file of stable-baselines3, of whose parts none is unpickled."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as file:
+            if sum(file.getinfo(part).file_size for part in ("data", "policy.pth")) > _MOST:
+                raise PolicyError("it is too large")
             about = json.loads(file.read("data"))
             stored = io.BytesIO(file.read("policy.pth"))
         weights = torch.load(stored, weights_only=True, map_location="cpu")
