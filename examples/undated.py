@@ -43,8 +43,7 @@ class Universal(Fast):
 
 if __name__ == "__main__":
     leg = load_robot("legv2-identified")
-    for kind in (Fast, Rl, Universal):
-        run = rollout(kind(leg, 200.0), RolloutConfig(leg), np.full((1000, 8), 0.3), seed=0)
-        print(
-            f"{kind.of} without dates: up to {run.data['height_m'][200:].max():.3f} m, not 0.300 m"
-        )
+    for name in ("Fast", "Rl", "Universal"):
+        controller = load_controller(f"{__file__}:{name}", leg)
+        run = rollout(controller, RolloutConfig(leg), np.full((1000, 8), 0.3), seed=0)
+        print(f"{name} without dates: up to {run.data['height_m'][200:].max():.3f} m, not 0.3 m")

@@ -1,7 +1,7 @@
 """A trained policy: an ONNX graph from raw joint measurements to joint torques.
 
 The file is self-contained: normalisation and torque scaling are inside the graph, its contract
-(robot, inputs with units, control rate, command range, known limits) is in its metadata, and as JSON
+(robot, inputs with units, rate, range of commands, known limits) is in its metadata, and as JSON
 beside it for other runtimes. It runs through onnxruntime alone.
 """
 

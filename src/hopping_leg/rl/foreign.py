@@ -20,7 +20,6 @@ import torch
 from onnx import compose, parser
 from torch import nn
 
-from hopping_leg.arrays import Array
 from hopping_leg.controllers.observation_history import FULL_TORQUE, make_observation_history
 from hopping_leg.controllers.policy import Card, Policy, open_session
 from hopping_leg.envs import TaskConfig
@@ -238,9 +237,10 @@ def _wrap(content: bytes, origin: str, observation: Observation, card: Card) -> 
         f"float[n,{str(s)[1:-1].rstrip(',')}] {k}" for k, s in history.shapes.items()
     )
     around = parser.parse_graph(f"""policy ({inputs}) => (float[n,2] torque) <
-        int64[{size}] place = {_list(place)}, float[{size}] offset = {_list(scaling.offset[place])},
-        float[{size}] gain = {_list(scaling.gain[place])}, float[2] full = {_list(card.torque_scale)},
-        float least = {{-1}}, float most = {{1}}> {{
+        int64[{size}] place = {_list(place)}, float[2] full = {_list(card.torque_scale)},
+        float[{size}] offset = {_list(scaling.offset[place])},
+        float[{size}] gain = {_list(scaling.gain[place])}, float least = {{-1}},
+        float most = {{1}}> {{
         {"".join(f"flat_{name} = Flatten ({name}) " for name in names)}
         joined = Concat <axis = 1> ({", ".join(f"flat_{name}" for name in names)})
         placed = Gather <axis = 1> (joined, place)
@@ -269,5 +269,5 @@ def _wrap(content: bytes, origin: str, observation: Observation, card: Card) -> 
     return wrapped
 
 
-def _list(values: Array | tuple[float, ...]) -> str:
+def _list(values: Any) -> str:  # noqa: ANN401
     return f"{{{', '.join(map(repr, np.asarray(values).tolist()))}}}"
