@@ -38,8 +38,6 @@ class ObservationHistory(Stateful, ABC):
         FULL_TORQUE: "N m",
     }  # fmt: skip
     """Of graph inputs; those not named have none."""
-    ticks_ago: ClassVar[dict[str, tuple[int, ...]]] = {}
-    """Ticks before now of an input's rows, where they are the same ones at every tick."""
     limit: ClassVar[str] = "It is not told how old its samples are."
     """What is known to be asked of who runs such a policy, or to be missing."""
 
@@ -53,10 +51,9 @@ class ObservationHistory(Stateful, ABC):
 
     @classmethod
     def describe(cls) -> dict[str, Any]:
-        """Return shape, unit and ticks of every graph input, as JSON values."""
+        """Return shape and unit of every graph input, as JSON values."""
         return {
             name: {"shape": ["n", *shape], "unit": cls.units.get(name, "1")}
-            | ({"ticks_ago": list(cls.ticks_ago[name])} if name in cls.ticks_ago else {})
             for name, shape in cls.shapes.items()
         }
 
@@ -117,10 +114,6 @@ def _dated_shapes(
     }
 
 
-def _ticks_ago(lags: tuple[int, ...], torque_lags: tuple[int, ...]) -> dict[str, tuple[int, ...]]:
-    return {"q": lags, "qd": lags, "past_torque": tuple(lag + 1 for lag in torque_lags)}
-
-
 class Dated(ObservationHistory):
     """Samples at fixed times before now, however late they came, and the policy's own torques.
 
@@ -136,9 +129,17 @@ class Dated(ObservationHistory):
     TORQUE_LAGS: ClassVar[tuple[int, ...]] = (0, 1, 2, 4, 6)
     """Ticks before the last action of the torques."""
     shapes: ClassVar[dict[str, tuple[int, ...]]] = _dated_shapes(LAGS, TORQUE_LAGS)
-    ticks_ago: ClassVar[dict[str, tuple[int, ...]]] = _ticks_ago(LAGS, TORQUE_LAGS)
     limit: ClassVar[str] = "It needs the age of every sample, which the paper's 15 inputs lack."
     STATE = ("_track", "_torques", "_command", "_fresh")
+
+    @classmethod
+    def describe(cls) -> dict[str, Any]:
+        """Return the same, and how many ticks before now each row of an input is."""
+        told = super().describe()
+        for name in told.keys() & {"q", "qd", "foot", "foot_velocity"}:
+            told[name]["ticks_ago"] = list(cls.LAGS)
+        told["past_torque"]["ticks_ago"] = [lag + 1 for lag in cls.TORQUE_LAGS]
+        return told
 
     def __init__(self, period: float) -> None:
         super().__init__(period)
@@ -200,7 +201,6 @@ class DatedLong(Dated):
     )  # fmt: skip
     TORQUE_LAGS: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64)
     shapes: ClassVar[dict[str, tuple[int, ...]]] = _dated_shapes(LAGS, TORQUE_LAGS)
-    ticks_ago: ClassVar[dict[str, tuple[int, ...]]] = _ticks_ago(LAGS, TORQUE_LAGS)
 
 
 class AnyLeg(Dated):
@@ -232,9 +232,6 @@ class AnyLeg(Dated):
         FULL_TORQUE: (2,),
     }
     units: ClassVar[dict[str, str]] = {"q": "rad", FULL_TORQUE: "N m"}
-    ticks_ago: ClassVar[dict[str, tuple[int, ...]]] = {
-        **Dated.ticks_ago, "foot": Dated.LAGS, "foot_velocity": Dated.LAGS,
-    }  # fmt: skip
 
     _numbers: Array | None = None
 
