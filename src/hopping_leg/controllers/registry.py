@@ -53,16 +53,14 @@ def load_policy(name_or_path: str | Path) -> Policy:
         return Policy((_SHIPPED / f"{name}.onnx").read_bytes(), f"shipped policy '{name}'", name)
     if name.endswith(POLICY_FILES):
         return Policy.load(Path(name))
-    if name.endswith((".pt", ".pth", ".ts")):
-        raise PolicyError(
-            f"{name} is no policy, and what a file of torch's may run is not run here; give the"
-            " module to `hopping_leg.export_policy`, which writes one."
-        )
     if name.endswith((".urdf", ".xml")):
         words = shlex.join(["hop", "robots", "import", name])
         raise UsageError(f"{name} is no controller; make a robot file of it: {words}.")
     if Path(name).exists():
-        raise PolicyError(f"{name} is not a policy file; those end in {' or '.join(POLICY_FILES)}.")
+        raise PolicyError(
+            f"{name} is not a policy file, {' or '.join(POLICY_FILES)}; `hopping_leg.export_policy`"
+            " writes one of a model in memory."
+        )
     raise UsageError(
         unknown_name("controller", name, controller_names())
         + " Or give an .onnx file, or a Python class as path/to/file.py:CLASS."

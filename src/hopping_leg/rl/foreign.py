@@ -9,7 +9,7 @@ import io
 import json
 import re
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -17,10 +17,13 @@ from typing import Any
 import numpy as np
 import onnx
 import torch
-from onnx import compose, parser
+from gymnasium.spaces import Box
+from onnx import helper
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.sac.policies import SACPolicy
+from stable_baselines3.td3.policies import TD3Policy
 from torch import nn
 
-from hopping_leg.controllers.observation_history import FULL_TORQUE, make_observation_history
 from hopping_leg.controllers.policy import Card, Policy, open_session
 from hopping_leg.envs import TaskConfig
 from hopping_leg.envs.observation import Observation, make_observation
@@ -33,14 +36,11 @@ from hopping_leg.robot import DEFAULT_ROBOT, load_robot, shipped_robots
 _HARMLESS = ("NormalizeObservation", "FlattenObservation", "ClipAction")  # wrappers
 _CHANGES = re.compile(r"gymnasium\.(core|vector\.\w+)\.(Vector)?(Observation|Action)Wrapper")
 
-_LAYER = re.compile(
-    r"(actor\.(latent_pi|mu)|mlp_extractor\.policy_net|action_net)\.(\d+\.)?(weight|bias)"
-)
-_ELSE = re.compile(r"(actor\.)?log_std|actor_target\.|critic|.*value_net")
-"""Weights of stable-baselines3's actors, and those that deterministic actions do not depend on."""
+_OPTIONS = ("net_arch", "squash_output", "clip_mean", "full_std", "use_expln")
+"""What stable-baselines3's actors are made with, beside use_sde and activation_fn."""
 
-_MOST = 1 << 29  # bytes of an actor
-_ACTIVATIONS = ("Tanh", "ReLU", "ELU", "LeakyReLU", "SiLU", "GELU", "Sigmoid")
+_MOST, _WIDEST = 1 << 29, 1 << 14  # bytes of weights, and neurons
+_NETWORK = "network"  # function of a policy's graph
 
 Act = Callable[[Any, torch.Tensor], torch.Tensor]
 
@@ -58,10 +58,9 @@ class Made:
 class _Model(Actor):
     """A model's deterministic actions, of observations normalised as its environment does."""
 
-    def __init__(self, module: Any, act: Act | None, layers: list[Any]) -> None:  # noqa: ANN401
+    def __init__(self, module: Any, act: Act | None = None, layers: Sequence[Any] = ()) -> None:  # noqa: ANN401
         super().__init__()
-        self.module, self._layers = module, layers
-        self._act = act or _act
+        self.module, self._act, self._layers = module, act, layers
         self._lstm: Any = None if act else getattr(module, "lstm_actor", None)
         if self._lstm:
             self.memory_size = 2 * self._lstm.num_layers * self._lstm.hidden_size
@@ -74,21 +73,21 @@ class _Model(Actor):
             mean, var = (torch.tensor(v).float() for v in (layer.obs_rms.mean, layer.obs_rms.var))
             observation = (observation - mean) / (var + layer.epsilon).sqrt()
             observation = observation.clip(-(most := getattr(layer, "clip_obs", 1e9)), most)
-        if not self._lstm:
-            return self._act(self.module, observation), memory
-        shape = (-1, 2, self._lstm.num_layers, self._lstm.hidden_size)
-        h, c = memory.reshape(shape).permute(1, 2, 0, 3)
-        seen = self.module.pi_features_extractor(observation)[None]
-        told, state = self._lstm(seen, (h.contiguous(), c.contiguous()))
-        action = self.module.action_net(self.module.mlp_extractor.forward_actor(told[0]))
-        return action, torch.stack(state).permute(2, 0, 1, 3).flatten(1)
-
-
-def _act(module: Any, observation: torch.Tensor) -> Any:  # noqa: ANN401
-    """Return the actions of a policy of stable-baselines3, or what another module gives."""
-    if hasattr(module, "_predict"):
-        return module._predict(observation, deterministic=True)
-    return module(observation)
+        if self._lstm:
+            shape = (-1, 2, self._lstm.num_layers, self._lstm.hidden_size)
+            h, c = memory.reshape(shape).permute(1, 2, 0, 3)
+            state, begun = (h.contiguous(), c.contiguous()), torch.zeros(len(observation))
+            action, state = self.module._predict(observation, state, begun, deterministic=True)
+            memory = torch.stack(state).permute(2, 0, 1, 3).flatten(1)
+        elif self._act:
+            action = self._act(self.module, observation)
+        elif hasattr(self.module, "_predict"):
+            action = self.module._predict(observation, deterministic=True)
+        else:
+            action = self.module(observation)
+        if not isinstance(action, torch.Tensor) or action.shape[1:] != (2,):
+            raise PolicyError("The model gives no actions (n, 2); say by act=... which they are.")
+        return action, memory
 
 
 def export_policy(
@@ -134,11 +133,6 @@ def export_policy(
     device, training = next(module.parameters()).device, module.training
     try:
         module.train(False).to("cpu")
-        with torch.no_grad():
-            seen = torch.zeros(1, task.observation.size)
-            action, _ = actor(seen, torch.zeros(1, actor.memory_size))
-        if not isinstance(action, torch.Tensor) or action.shape != (1, 2):
-            raise PolicyError("The model gives no actions (n, 2); say by act=... which they are.")
         content = build_policy(actor, task.observation, card)
     except RuntimeError as error:
         raise PolicyError(
@@ -183,7 +177,7 @@ def convert(content: bytes, path: Path) -> bytes:
     return _wrap(content, str(path), seen, card)
 
 
-def _read_sb3(content: bytes, origin: str, size: int) -> DenseActor:
+def _read_sb3(content: bytes, origin: str, size: int) -> Actor:
     """Return the actor of a file of stable-baselines3, of whose parts none is unpickled."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as file:
@@ -192,73 +186,59 @@ def _read_sb3(content: bytes, origin: str, size: int) -> DenseActor:
             about = json.loads(file.read("data"))
             stored = io.BytesIO(file.read("policy.pth"))
         weights = torch.load(stored, weights_only=True, map_location="cpu")
-        options = about["policy_kwargs"]
-        unknown = [n for n in weights if not _LAYER.fullmatch(n) and not _ELSE.match(n)]
-        unknown += [name for name in options if "features_extractor_" in name]
+        told = about["policy_kwargs"]
+        options = {name: told[name] for name in _OPTIONS if name in told}
+        if about["use_sde"]:
+            options["use_sde"] = True
+        if "activation_fn" in told:
+            name = told["activation_fn"].strip("<>'").split(".")[-1]
+            options["activation_fn"] = getattr(nn, name)
+        own = [name for name in told if "features_extractor" in name]
+        if own or sum(1 + int(n) for n in re.findall(r"\d+", str(options))) > _WIDEST:
+            raise PolicyError(f"it has {', '.join(own) or 'too many neurons'}")
         on_policy = "action_net.weight" in weights
-        named = str(options.get("activation_fn", "Tanh" if on_policy else "ReLU"))
-        activation = named.strip("<>'").rpartition(".")[2] or named
-        if unknown or activation not in _ACTIVATIONS:
-            raise PolicyError(f"it has {', '.join([*unknown, activation][:2])}")
-        last: list[nn.Module] = []
-        if options.get("use_sde") and not on_policy:
-            last = [nn.Hardtanh(-(most := float(options.get("clip_mean", 2.0))), most)]
-        if not on_policy or options.get("squash_output"):
-            last.append(nn.Tanh())
-        linear, layers = [w for n, w in weights.items() if _LAYER.fullmatch(n)], list[nn.Module]()
-        for weight, bias in zip(linear[::2], linear[1::2], strict=True):
-            layers += [nn.Linear(*weight.shape[::-1]), getattr(nn, activation)()]
-            layers[-2].load_state_dict({"weight": weight, "bias": bias})
-        actor = DenseActor(*layers[:-1], *last)
-        with torch.no_grad():
-            actor(torch.zeros(1, size), torch.zeros(1, 0))[0].reshape(1, 2)
+        kind = SACPolicy if "actor.latent_pi.0.weight" in weights else TD3Policy
+        spaces = Box(-np.inf, np.inf, (size,)), Box(-1.0, 1.0, (2,))
+        policy = (ActorCriticPolicy if on_policy else kind)(*spaces, lambda _: 0.0, **options)
+        actor = policy if on_policy else policy.actor
+        at = "" if on_policy else "actor."
+        named = {n.removeprefix(at): w for n, w in weights.items() if n.startswith(at)}
+        actor.load_state_dict(named)
     except Exception as error:  # zipfile, json and torch raise many unrelated types
         raise PolicyError(
             f"{origin} is not read as an actor of stable-baselines3 from {size} observations to two"
             f" actions ({one_line(error)}); say in {Path(origin).with_suffix('.toml')} what the"
             " environment was made with, or load it and use `hopping_leg.export_policy`."
         ) from error
-    return actor
+    return _Model(actor)
 
 
 def _wrap(content: bytes, origin: str, observation: Observation, card: Card) -> bytes:
-    """Return a policy file around an ONNX network from observations, (n, size), to actions."""
-    shown = {i.name: tuple(i.shape[1:]) for i in open_session(content, origin).get_inputs()}
-    size, history = observation.size, make_observation_history(card.layout, 1 / card.rate)
-    if list(shown.values()) != [(size,)]:
+    """Return a policy file with an ONNX network in the place of its actor."""
+    shown = [tuple(i.shape[1:]) for i in open_session(content, origin).get_inputs()]
+    if shown != [(observation.size,)]:
         raise PolicyError(
-            f"{origin} takes {list(shown.values())}, not one observation of {size} numbers; where"
-            f" its environment had options, tell them in {Path(origin).with_suffix('.toml')}."
+            f"{origin} takes {shown}, not one observation of {observation.size} numbers; where its"
+            f" environment had options, tell them in {Path(origin).with_suffix('.toml')}."
         )
-    model, names = onnx.load_from_string(content), history.network_inputs
-    network = compose.add_prefix(model, "network.").graph
-    place, scaling = np.argsort(observation.order), observation.scaling
-    inputs = ", ".join(
-        f"float[n,{str(s)[1:-1].rstrip(',')}] {k}" for k, s in history.shapes.items()
-    )
-    around = parser.parse_graph(f"""policy ({inputs}) => (float[n,2] torque) <
-        int64[{size}] place = {_list(place)}, float[2] full = {_list(card.torque_scale)},
-        float[{size}] offset = {_list(scaling.offset[place])},
-        float[{size}] gain = {_list(scaling.gain[place])}, float least = {{-1}},
-        float most = {{1}}> {{
-        {"".join(f"flat_{name} = Flatten ({name}) " for name in names)}
-        joined = Concat <axis = 1> ({", ".join(f"flat_{name}" for name in names)})
-        placed = Gather <axis = 1> (joined, place)
-        centred = Sub (placed, offset)
-        seen = Mul (centred, gain)
-        clipped = Clip (action, least, most)
-        torque = Mul (clipped, {FULL_TORQUE if FULL_TORQUE in history.shapes else "full"}) }}""")
-    *before, clip, scale = around.node
-    before[-1].output[0], clip.input[0] = network.input[0].name, network.output[0].name
-    nodes = [*before, *network.node, clip, scale]
-    del around.node[:]
-    around.node.extend(nodes)
-    around.initializer.extend(network.initializer)
-    model.graph.CopyFrom(around)
+    stand_in = DenseActor(nn.Linear(observation.size, 2))
+    model = onnx.load_from_string(build_policy(stand_in, observation, card))
+    network = onnx.load_from_string(content)
+    graph, opsets = network.graph, network.opset_import
+    stored = [helper.make_node("Constant", [], [w.name], value=w) for w in graph.initializer]
+    ends, nodes = ([graph.input[0].name], [graph.output[0].name]), [*stored, *graph.node]
+    function = helper.make_function(_NETWORK, _NETWORK, *ends, nodes, opsets)
+    model.functions.extend([*network.functions, function])
+    del model.opset_import[:]
+    model.opset_import.extend([*opsets, helper.make_opsetid(_NETWORK, 1)])
+    model.ir_version = max(model.ir_version, network.ir_version)
+    (linear,) = (node for node in model.graph.node if node.op_type == "Gemm")
+    call = helper.make_node(_NETWORK, linear.input[:1], linear.output, domain=_NETWORK)
+    linear.CopyFrom(call)
     try:
         wrapped = with_card(model.SerializeToString(), card)
         session, rng = open_session(wrapped, origin), np.random.default_rng(0)
-        legs = {k: rng.random((2, *shape), np.float32) for k, shape in history.shapes.items()}
+        legs = {i.name: rng.random((2, *i.shape[1:]), np.float32) for i in session.get_inputs()}
         alone = [session.run(None, {k: v[i : i + 1] for k, v in legs.items()})[0] for i in (0, 1)]
         if not np.allclose(session.run(None, legs)[0], np.concatenate(alone), atol=1e-4):
             raise PolicyError("drawn at random, or of several legs together")
@@ -267,7 +247,3 @@ def _wrap(content: bytes, origin: str, observation: Observation, card: Card) -> 
             f"{origin} does not give two deterministic actions of each leg ({one_line(error)})."
         ) from error
     return wrapped
-
-
-def _list(values: Any) -> str:  # noqa: ANN401
-    return f"{{{', '.join(map(repr, np.asarray(values).tolist()))}}}"
