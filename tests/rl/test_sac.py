@@ -78,15 +78,3 @@ def test_an_episode_ends_as_stable_baselines_wants_it():
     assert infos[0]["episode"]["r"] == pytest.approx(total)
     assert not np.allclose(infos[0]["terminal_observation"], observation[0])
     assert infos[0]["terminal_observation"].shape == env.observation_space.shape
-
-
-def test_terms_of_the_reward_are_means_since_they_were_last_taken():
-    env, task = make(), make().task
-    env.reset()
-    task.reset()
-    assert env.take_reward_terms() == {}
-    for ticks in (4, 2):
-        expected = np.mean([task.step(np.full((3, 2), 0.5)).terms for _ in range(ticks)], (0, 1))
-        for _ in range(ticks):
-            env.step(np.full((3, 2), 0.5))
-        assert list(env.take_reward_terms().values()) == pytest.approx(expected.tolist())

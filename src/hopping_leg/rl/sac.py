@@ -47,17 +47,8 @@ class TaskVecEnv(Stateful, VecEnv):  # type: ignore[misc]
         space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
         self.render_mode = None
         super().__init__(task.count, space, gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32))
-        self._terms, self._steps = np.zeros(len(task.reward.names)), 0
         self._nothing: list[dict[str, Any]] = [{} for _ in range(task.count)]
         self._action: Array32 = np.zeros((task.count, 2), np.float32)
-
-    def take_reward_terms(self) -> dict[str, float]:
-        """Return the reward's unweighted terms by name, mean per tick since the last call."""
-        if not self._steps:
-            return {}
-        means = self._terms / self._steps
-        self._terms, self._steps = np.zeros_like(self._terms), 0
-        return dict(zip(self.task.reward.names, means.tolist(), strict=True))
 
     def reset(self) -> Array32:
         """Begin new episodes of all legs."""
@@ -70,8 +61,6 @@ class TaskVecEnv(Stateful, VecEnv):  # type: ignore[misc]
     def step_wait(self) -> tuple[Array32, Array, BoolArray, list[dict[str, Any]]]:
         """Step all legs; legs whose episode ended have begun the next."""
         step = self.task.step(self._action)
-        self._terms += np.mean(step.terms, axis=0)
-        self._steps += 1
         done = step.terminated | step.truncated
         infos = self._end_episodes(step, done) if done.any() else self._nothing
         return self._observation(step.observation), step.reward, done, infos
@@ -231,8 +220,6 @@ class ResumableSAC(Stateful, SAC):  # type: ignore[misc]
 
     def collect_rollouts(self, *args: Any, **kwargs: Any) -> Any:  # noqa: ANN401
         """Collect a rollout as usual, after the callback."""
-        for name, mean in self.env.take_reward_terms().items():
-            self.logger.record_mean(f"reward/{name}", mean)
         self.task.reward.anneal(self.share)
         if self.on_boundary is not None:
             self.on_boundary()
