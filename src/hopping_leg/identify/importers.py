@@ -75,8 +75,9 @@ def read_log(table: pl.DataFrame, path: Path) -> tuple[pl.DataFrame, RecordingMe
     RecordingError says that no rig has such columns, or that the path names another design of the
     rig than the robot's, e.g. designC0.
     """
-    if "t" not in table.columns:  # the same logs before they were converted
-        table = table.rename({"time": "t"}, strict=False)
+    others = {"time": "t"} | {c: f"{c[:-4]}_cmd" for c in table.columns if c.endswith("_des")}
+    others = {old: new for old, new in others.items() if new not in table.columns}
+    table = table.rename(others, strict=False)  # the same logs before they were converted
     known = (f for f in map(log_format, RIGS) if set(f.recognised_by).issubset(table.columns))
     rig = next(known, None)
     if rig is None:

@@ -283,7 +283,7 @@ def _drop_spikes(inspection: Inspection, column: str, least: float, often: float
 
 
 def _check_jumps(inspection: Inspection) -> None:
-    """Refuse angles that jump, or are beyond the robot's mechanical stops."""
+    """Refuse angles that jump, have another sign, or are beyond the robot's mechanical stops."""
     for name, column in zip(JOINTS, PAIRS["position"], strict=True):
         known, steps, times = _steps(inspection, column)
         jumps = np.abs(steps) > np.maximum(_LEAP, _FASTEST * times)
@@ -296,6 +296,15 @@ def _check_jumps(inspection: Inspection) -> None:
         if (robot := inspection.robot) is None:
             continue
         joint, q = getattr(robot, name), inspection.floats(column)
+        middle = float(np.nanmedian(q)) if len(known) else np.nan
+        if inspection.metadata.rig != "fixed-base" and (
+            joint.lower <= -middle <= joint.upper and not joint.lower <= middle <= joint.upper
+        ):
+            inspection.refuse(
+                f"column '{column}' is about {middle:.3g} rad, but a standing '{robot.name}' has"
+                f" {joint.lower:g} to {joint.upper:g}: its sign is another; change it, with that of"
+                " the joint's velocity, torque and commands"
+            )
         low, high = joint.stop_lower - _OUTSIDE, joint.stop_upper + _OUTSIDE
         beyond = np.flatnonzero((q < low) | (q > high))
         if len(beyond) and high - low < _TURN:
