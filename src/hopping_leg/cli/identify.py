@@ -100,7 +100,7 @@ def run(args: Identify) -> None:
         )
     result.save_robot(identified, args.out, origin)
     warning = result.warning(identified)
-    say(*filter(None, (warning, result.at_bounds(identified))))
+    say(*filter(None, (result.verdict(identified), warning, result.at_bounds(identified))))
     show_table(result.PARAMETERS, result.shown_parameters(identified))
     show_table(result.ERRORS, result.shown_errors(identified))
     say(*identified.identifiability.statements)

@@ -22,7 +22,10 @@ from hopping_leg.robot.model_mismatch import NO_MISMATCH
 from hopping_leg.robot.robot_checks import check_physics, numbers
 
 _DELAY, _LATENCY = "drive.delay", "reality.latency.command"
-_WORSE = 1.01  # Geometric mean of errors after the fit over those before, from which on it is worse
+_WORSE, _JOINT_WORSE = 1.01, 1.2
+"""Geometric mean of errors after the fit over those before from which on it is worse: of both
+joints, and of the worse one."""
+_FINE = {"rad": 1e-3, "N m": 0.02}  # Errors that are added to both: below them nothing is worse
 PARAMETERS = ("parameter", "start", "identified", "95 % interval", "unit")
 """What is shown of each parameter."""
 ERRORS = ("on held-out data, rms", "before: hip", "knee", "after: hip", "knee", "unit")
@@ -165,17 +168,32 @@ def quality_json(identified: Identified) -> list[dict[str, Any]]:
 
 def warning(identified: Identified) -> str:
     """Return a sentence if the fit errs more than its start on held-out data, else ""."""
-    rows = quality_json(identified)
-    pairs = [(row[f"{j}_before"], row[f"{j}_after"]) for row in rows for j in JOINTS]
-    known = [math.log(after / before) for before, after in pairs if before > 0 and after > 0]
-    ratio = math.exp(sum(known) / max(len(known), 1))
-    if ratio < _WORSE:
+    worse, rows = {}, quality_json(identified)
+    for joint in JOINTS:
+        pairs = [
+            [row[f"{joint}_{t}"] + _FINE[row["unit"]] for t in ("before", "after")] for row in rows
+        ]
+        logs = [math.log(after / before) for before, after in pairs if after / before > 0]
+        worse |= {joint: math.exp(sum(logs) / len(logs))} if logs else {}
+    joint = max(worse, key=worse.__getitem__, default="")
+    if not worse or (
+        worse[joint] < _JOINT_WORSE and math.prod(worse.values()) < _WORSE ** len(worse)
+    ):
         return ""
     return (
-        f"On data that it has not seen this fit errs {ratio:.3g} times as much as what it began"
-        " with: do not use it; check the recordings' signs, units and gains, or fit fewer"
-        " parameters."
+        f"On data that it has not seen this fit errs {worse[joint]:.3g} times as much, {joint}, as"
+        " what it began with: do not use it; check the recordings' signs, units and gains, whose"
+        " links they are and what else moves them, or fit fewer parameters."
     )
+
+
+def verdict(identified: Identified) -> str:
+    """Return how far each joint is off on held-out data, predicted from torques if these tell."""
+    if not (shown := shown_errors(identified)):
+        return "No data that it has not seen tell how good this fit is: give some, --validate."
+    error, *errors, unit = max(shown, key=lambda row: "predicted" in row[0])
+    said = (f"{j} {errors[i + 2]} {unit} ({errors[i]} before)" for i, j in enumerate(JOINTS))
+    return f"On data that it has not seen, {error}, rms: {', '.join(said)}."
 
 
 def at_bounds(identified: Identified) -> str:
