@@ -47,6 +47,8 @@ class PlanarLeg:
     knee's, at the joint; as far as the file states them."""
     notes: list[str]
     """Lines on hip's and knee's angle by the file's coordinates, and on what is not read."""
+    doubts: list[str]
+    """Sentences on what the file hardly means."""
 
 
 def read_leg(
@@ -99,7 +101,12 @@ def read_leg(
         for key, (value, source) in entries.items()
         if value > 0 or "stop" in key
     }
-    return PlanarLeg(tree.name, numbers, notes)
+    doubts = [f"'{tree.body(i)}' weighs nothing." for i in sorted(tree.weightless & moving)]
+    for name, (low, high) in ((tree.joint(i), tree.model.jnt_range[i]) for i in joints):
+        if max(-low, high) > _TURN:
+            doubts.append(f"'{name}' ends at {low:g} and {high:g} rad, left out: in degrees?")
+    said = [f"{tree.origin}: {doubt}" for doubt in doubts]
+    return PlanarLeg(tree.name, numbers, notes, said)
 
 
 def _named(tree: Description, option: str, kind: str, name: str, valid: Iterable[str]) -> str:
