@@ -114,7 +114,15 @@ def _dispatch(words: list[str]) -> int:
         raise UsageError(unknown_name("verb", verb, VERBS) + " Try `hop --help`.")
     COMMAND.set(shlex.join(["hop", *words]))
     own, rest = ("view", [*DEMO, *rest]) if verb == "demo" else (verb, rest)
-    module = importlib.import_module(f"hopping_leg.cli.{own}")
+    try:
+        module = importlib.import_module(f"hopping_leg.cli.{own}")
+    except (AttributeError, RuntimeError) as error:  # where MuJoCo imports OpenGL
+        if "mujoco" in sys.modules or (drawing := os.environ.get("MUJOCO_GL")) is None:
+            raise
+        sentence = (
+            f"MuJoCo finds no library for MUJOCO_GL={drawing} ({error}); unset or install it."
+        )
+        raise UsageError(sentence) from error
     kind = get_type_hints(module.run, include_extras=True)["args"]
     module.run(read_options(kind, f"hop {verb}", inspect.getdoc(module), rest))
     return 0
