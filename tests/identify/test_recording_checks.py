@@ -99,7 +99,7 @@ def test_a_joint_of_another_sign_is_refused_where_the_leg_stands(joint):
     flipped = [-pl.col(PAIRS[name][joint]) for name in ("position", "velocity")]
     table = swinging().with_columns(pl.col(HIP) + 0.7)
     assert load(table, rig="rail").warnings == load(table.with_columns(flipped)).warnings == ()
-    with pytest.raises(RecordingError, match=f"'{column}'.*its sign is another"):
+    with pytest.raises(RecordingError, match=f"'{column}'.*change the joint.s sign"):
         load(table.with_columns(flipped), rig="rail")
 
 

@@ -1,5 +1,4 @@
 import dataclasses
-import re
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -199,18 +198,14 @@ def test_a_foot_that_the_file_does_not_say_is_as_far_from_the_knee_as_is_given(t
     assert (leg.shank.length, leg.shank.com) == (0.2, pytest.approx(0.07 * 0.13 / 0.148, rel=1e-3))
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "doubted"),
-    [
-        ("", "", ()),
-        ('value="0.42"', 'value="0"', ("'carriage' weighs nothing",)),
-        ('upper="2.5"', 'upper="143"', ("'knee_pitch' ends at 0 and 143 rad.*in degrees",)),
-    ],
-)
-def test_what_a_file_hardly_means_is_doubted(tmp_path, old, new, doubted):
-    (tmp_path / "leg.urdf").write_text(EXAMPLE.replace(old, new))
-    for pattern, doubt in zip(doubted, read_leg(tmp_path / "leg.urdf").doubts, strict=True):
-        assert re.search(pattern, doubt)
+def test_what_a_file_hardly_means_is_doubted(tmp_path):
+    file = tmp_path / "leg.urdf"
+    file.write_text(EXAMPLE)
+    assert read_leg(file).doubts == []
+    file.write_text(EXAMPLE.replace('value="0.42"', 'value="0"').replace('"2.5"', '"143"'))
+    weightless, far = read_leg(file).doubts
+    assert "'carriage' weighs nothing" in weightless
+    assert "'knee_pitch' ends at 0 and 143 rad: in degrees?" in far
 
 
 def test_joints_that_are_not_the_legs_are_held_and_named(tmp_path):

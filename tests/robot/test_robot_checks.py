@@ -94,8 +94,8 @@ def test_a_value_in_another_unit_is_doubted_where_it_stands(tmp_path, number, da
     value = (entry["value"] * factor, entry["unit"])
     found = said(written(tmp_path / "leg.toml", {path: value}, "legv2"))
     exact = path.endswith((".mass", ".length", ".rotor_inertia"))
-    named = path if exact else path.partition(".")[0]
-    assert any(f"'{named}{'' if exact else '.'}" in sentence for sentence in found)
+    named = f"'{path}'" if exact else f"'{path.partition('.')[0]}."
+    assert any(named in sentence for sentence in found)
 
 
 @pytest.mark.parametrize(("upper", "doubted"), [(-0.1, True), (0.25, True), (0.9, False)])

@@ -3,8 +3,8 @@
 ``docs/other-tools.md`` says which topic holds what. Times are those of the trace, from the start
 of the run, as header's stamp and as time of the log. Of a bag, an MCAP file or rosbag2's folders
 and files in SQLite (.db3), columns are called after topic, joint and quantity, as in
-``joint_states/hip.position``, a ``std_msgs/Float64`` after its topic, numbers of a
-``Float64MultiArray`` as ``effort_controller/commands[0]``.
+``joint_states/hip.position``, a ``std_msgs/Float64`` after its topic, of a ``Float64MultiArray`` as
+``commands[0]``.
 """
 
 import io
@@ -22,8 +22,7 @@ from hopping_leg.io import Tree
 from hopping_leg.trace import SCHEMA, Trace
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
-FLOAT = "std_msgs/msg/Float64"
-FLOATS = "std_msgs/msg/Float64MultiArray"
+FLOAT, FLOATS = "std_msgs/msg/Float64", "std_msgs/msg/Float64MultiArray"
 
 STATES = "joint_states"
 COMMANDS = "joint_commands"

@@ -127,15 +127,9 @@ def _check_conventions(recording: Recording, start: LegHypothesis) -> None:
         )
 
 
-def _unexplained(
-    driven: Recording,
-    start: LegHypothesis,
-    angles: Pair,
-    torques: Pair,
-    turns: Pair,
-) -> float:
+def _unexplained(driven: Recording, start: LegHypothesis, *convention: Pair) -> float:
     """Return the share of the motion that its torques do not predict, infinite if unknown."""
-    changes = []
+    (angles, torques, turns), changes = convention, []
     for joint in range(2):
         for name in ("position", "velocity", "position_estimate", "velocity_estimate"):
             shift = turns[joint] * np.pi / 2 if name.startswith("position") else 0.0

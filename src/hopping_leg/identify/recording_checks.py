@@ -81,9 +81,8 @@ def check_table(inspection: Inspection) -> None:
     _check_sizes(inspection)
     _check_motion(inspection)
     _check_jumps(inspection)
-    for joint in range(2):
-        _check_velocity(inspection, PAIRS["position"][joint], PAIRS["velocity"][joint])
-    for joint in range(2):
+    for joint, columns in enumerate(zip(PAIRS["position"], PAIRS["velocity"], strict=True)):
+        _check_velocity(inspection, *columns)
         _check_torque(inspection, joint)
     _warn_of_stalls(inspection)
 
@@ -296,14 +295,13 @@ def _check_jumps(inspection: Inspection) -> None:
         if (robot := inspection.robot) is None:
             continue
         joint, q = getattr(robot, name), inspection.floats(column)
-        middle = float(np.nanmedian(q)) if len(known) else np.nan
-        if inspection.metadata.rig != "fixed-base" and (
-            joint.lower <= -middle <= joint.upper and not joint.lower <= middle <= joint.upper
-        ):
+        stands = inspection.metadata.rig != "fixed-base" and len(known) > 0
+        middle = float(np.median(q[known])) if stands else np.nan
+        if joint.lower <= -middle <= joint.upper and not joint.lower <= middle <= joint.upper:
             inspection.refuse(
                 f"column '{column}' is about {middle:.3g} rad, but a standing '{robot.name}' has"
-                f" {joint.lower:g} to {joint.upper:g}: its sign is another; change it, with that of"
-                " the joint's velocity, torque and commands"
+                f" {joint.lower:g} to {joint.upper:g}: change the joint's sign, that of its"
+                " velocity, torque and commands, too"
             )
         low, high = joint.stop_lower - _OUTSIDE, joint.stop_upper + _OUTSIDE
         beyond = np.flatnonzero((q < low) | (q > high))

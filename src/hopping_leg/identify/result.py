@@ -22,10 +22,8 @@ from hopping_leg.robot.model_mismatch import NO_MISMATCH
 from hopping_leg.robot.robot_checks import check_physics, numbers
 
 _DELAY, _LATENCY = "drive.delay", "reality.latency.command"
-_WORSE, _JOINT_WORSE = 1.01, 1.2
-"""Geometric mean of errors after the fit over those before from which on it is worse: of both
-joints, and of the worse one."""
-_FINE = {"rad": 1e-3, "N m": 0.02}  # Errors that are added to both: below them nothing is worse
+_WORSE, _JOINT_WORSE = 1.01, 1.2  # Mean factor on errors that is worse, of both joints and of one
+_FINE = {"rad": 1e-3, "N m": 0.02}  # Errors that are added: below them nothing is worse
 PARAMETERS = ("parameter", "start", "identified", "95 % interval", "unit")
 """What is shown of each parameter."""
 ERRORS = ("on held-out data, rms", "before: hip", "knee", "after: hip", "knee", "unit")
@@ -100,9 +98,8 @@ def as_json(identified: Identified, posterior: int = 0) -> dict[str, Any]:
         "cannot_tell": known.statements,
         "search": {
             "method": plan.search,
-            "scoring": {**asdict(plan.scoring), "velocity": None},  # never scored
+            "scoring": asdict(plan.scoring),
             "window_s": plan.window,
-            "stride_s": plan.window,
             "unscored_s": plan.unscored,
             "timestep_s": COARSE_TIMESTEP,
             "passes": [
@@ -112,7 +109,6 @@ def as_json(identified: Identified, posterior: int = 0) -> dict[str, Any]:
                     "cost": one.found.cost,
                     "candidates": one.found.evaluations,
                     "history": one.found.history,
-                    "other_starts": [],
                 }
                 for one in identified.passes
             ],

@@ -102,11 +102,11 @@ def read_leg(
         if value > 0 or "stop" in key
     }
     doubts = [f"'{tree.body(i)}' weighs nothing." for i in sorted(tree.weightless & moving)]
-    for name, (low, high) in ((tree.joint(i), tree.model.jnt_range[i]) for i in joints):
-        if max(-low, high) > _TURN:
-            doubts.append(f"'{name}' ends at {low:g} and {high:g} rad, left out: in degrees?")
-    said = [f"{tree.origin}: {doubt}" for doubt in doubts]
-    return PlanarLeg(tree.name, numbers, notes, said)
+    far = (
+        (i, *tree.model.jnt_range[i]) for i in joints if abs(tree.model.jnt_range[i]).max() > _TURN
+    )
+    doubts += [f"'{tree.joint(i)}' ends at {a:g} and {b:g} rad: in degrees?" for i, a, b in far]
+    return PlanarLeg(tree.name, numbers, notes, [f"{tree.origin}: {doubt}" for doubt in doubts])
 
 
 def _named(tree: Description, option: str, kind: str, name: str, valid: Iterable[str]) -> str:

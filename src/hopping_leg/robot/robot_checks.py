@@ -106,10 +106,8 @@ def _doubtful_stance(robot: Robot) -> Iterator[str]:
     thigh, shank = robot.thigh.length, robot.shank.length
     hip = np.arctan2(-shank * np.sin(knee), thigh + shank * np.cos(knee))
     if not np.any((robot.hip.lower <= hip) & (hip <= robot.hip.upper)):
-        yield (
-            "within 'hip.lower' to 'knee.upper' the foot never comes below the hip; is a joint's"
-            " sign wrong, or does the knee bend forward?"
-        )
+        never = "within 'hip.lower' to 'knee.upper' the foot never comes below the hip; "
+        yield never + "is a joint's sign wrong, or does the knee bend forward?"
     torque, limit = robot.mass * GRAVITY * thigh * abs(np.sin(hip[25])), robot.knee.torque_limit
     if torque > _STANDING * limit:
         yield (
