@@ -164,7 +164,7 @@ def quality_json(identified: Identified) -> list[dict[str, Any]]:
 
 def warning(identified: Identified) -> str:
     """Return a sentence if the fit errs more than its start on held-out data, else ""."""
-    worse, rows = {}, quality_json(identified)
+    worse, rows = dict[str, float](), quality_json(identified)
     for joint in JOINTS:
         pairs = [
             [row[f"{joint}_{t}"] + _FINE[row["unit"]] for t in ("before", "after")] for row in rows
