@@ -3,8 +3,7 @@
 ``docs/other-tools.md`` says which topic holds what. Times are those of the trace, from the start
 of the run, as header's stamp and as time of the log. Of a bag, an MCAP file or rosbag2's folders
 and files in SQLite (.db3), columns are called after topic, joint and quantity, as in
-``joint_states/hip.position``, a ``std_msgs/Float64`` after its topic, of a ``Float64MultiArray`` as
-``commands[0]``.
+``joint_states/hip.position``, a ``std_msgs/Float64`` after its topic, an array's as ``topic[0]``.
 """
 
 import io
