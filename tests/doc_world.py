@@ -1,7 +1,10 @@
 """What stands around the commands of the documentation: what makes them short, and their files."""
 
+import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars.selectors as cs
@@ -10,7 +13,7 @@ from hopping_leg import cli
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.flight_recorder import FlightRecorder
-from hopping_leg.robot import load_robot
+from hopping_leg.robot import JOINTS, load_robot
 from hopping_leg.sim.randomization import draw_twin
 from hopping_leg.trace import Trace
 from tests.doc_pages import ROOT, blocks
@@ -51,6 +54,18 @@ CODES = {
 }
 """Exit codes other than 0: a training that is interrupted, a straight leg that is not armed."""
 
+CLAIMS: dict[str, Callable[[dict[str, Any]], bool]] = {
+    "environment": lambda names: names["model"].num_timesteps == 2048,
+    "identify": lambda _: all(
+        row[f"{joint}_after"] < row[f"{joint}_before"]
+        for row in _rows("identified.json", "quality")[:1]
+        for joint in JOINTS
+    ),
+    "robot": lambda _: all(r["hops"] for r in _rows("runs/heron/first/evaluation.json", "summary")),
+}
+"""What holds at the end of a page whose snippets left some names, beyond commands that end well."""
+
+
 BEFORE = {"own-controller": "class TheirController:\n    def __init__(self, mass, dt): pass"}
 """Python that a page takes for granted."""
 
@@ -65,15 +80,20 @@ def shorten(words: list[str]) -> list[str]:
 
 
 def furnish(page: str) -> None:
-    """Put the files that a page takes for granted into the current folder."""
-    shutil.copytree(ROOT / "examples", "examples")
-    shutil.copy("examples/my_leg.toml", "my_leg.toml")
+    """Put what a page takes for granted, or lets the reader write, into the current folder."""
+    code = "\n\n".join(b.text for b in blocks(page) if b.language in ("bash", "python"))
+    if "examples/" in code:
+        shutil.copytree(ROOT / "examples", "examples")
+    if "my_leg.toml" in code:
+        legs = [b.text for b in blocks(page) if b.text.startswith('name = "my-leg"')]
+        text = legs[0] if legs else (ROOT / "examples/my_leg.toml").read_text()
+        Path("my_leg.toml").write_text(text)
     Path("runs/deploy").mkdir(parents=True)
     make = {
         "deploy": (_wired_leg, _killed_run),
         "evaluation": (_trained_policy,),
         "other-tools": (_bag, _stored_trial, _trained_policy),
-        "own-controller": (_first_controller,),
+        "own-controller": (write_tutorial,),
         "transfer": (lambda: draw_twin(0).save(Path("my_twin.toml")),),
         "viewer": (_stored_trial, _killed_run),
     }
@@ -81,10 +101,14 @@ def furnish(page: str) -> None:
         part()
 
 
-def _first_controller() -> None:
-    """Write what the page lets the reader write."""
+def write_tutorial() -> None:
+    """Write the file that the page on own controllers lets the reader write."""
     code = [b.text for b in blocks("own-controller") if b.language == "python"][:3]
     Path("first.py").write_text("\n\n".join(code))
+
+
+def _rows(file: str, name: str) -> list[dict[str, Any]]:
+    return json.loads(Path(file).read_text())[name]
 
 
 def _trained_policy() -> None:
