@@ -43,7 +43,7 @@ VERBS = {
 """Every verb with its line in the overview."""
 
 DEMO = ("universal", "energy-shaping")
-"""What `hop view` shows as `hop demo`: the policy for any leg, and the classical controller."""
+"""What `hop demo`, `hop view` and the live page show first: learned beside classical control."""
 
 COMMAND = ContextVar("COMMAND", default="hop")
 """The command that runs, as the shell reads it, for what is stored."""
@@ -113,9 +113,8 @@ def _dispatch(words: list[str]) -> int:
     if verb not in VERBS:
         raise UsageError(unknown_name("verb", verb, VERBS) + " Try `hop --help`.")
     COMMAND.set(shlex.join(["hop", *words]))
-    own, rest = ("view", [*DEMO, *rest]) if verb == "demo" else (verb, rest)
     try:
-        module = importlib.import_module(f"hopping_leg.cli.{own}")
+        module = importlib.import_module(f"hopping_leg.cli.{'view' if verb == 'demo' else verb}")
     except (AttributeError, RuntimeError) as error:  # where MuJoCo imports OpenGL
         if "mujoco" in sys.modules or (drawing := os.environ.get("MUJOCO_GL")) is None:
             raise
