@@ -66,7 +66,7 @@ class Ablation:
             if name not in VARIANTS:
                 raise UsageError(unknown_name("variant", name, VARIANTS))
         robot = load_robot(self.robot)
-        usual, _ = within_reach(FAST.replace(steps=self.steps).fit(robot), robot)
+        usual = within_reach(FAST.replace(steps=self.steps).fit(robot), robot)
         rows = []
         for name in self.variants:
             meaning, changes = VARIANTS[name]

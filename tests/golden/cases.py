@@ -158,7 +158,7 @@ MADE = {
 
 
 def _trained(folder: Path, recipe: str) -> Values:
-    """Return weights of a training's snapshots and policy, and scores of its trials and stages."""
+    """Return weights of a training's snapshots and policy, and scores of its trials."""
     numbers = ["num_envs=4", "eval_every=64", "eval_start=0.5", *RECIPES[recipe]]
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(policy_evaluation.evaluate_policy.__kwdefaults__, "seconds", 0.5)
@@ -169,7 +169,7 @@ def _trained(folder: Path, recipe: str) -> Values:
         )  # fmt: skip
     files = [*sorted((folder / "run" / "snapshots").iterdir()), folder / "run" / "policy.onnx"]
     told = json.loads((folder / "run" / "result.json").read_text())
-    scores = [row["score_m"] for row in [*told["history"], *told["stages"]]]
+    scores = [row["score_m"] for row in told["history"]]
     return [np.array(scores, float), *(w for file in files for w in _weights(file))]
 
 

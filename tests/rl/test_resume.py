@@ -1,6 +1,5 @@
 """What was stopped goes on as if nothing had happened, and nothing else is taken for it."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -40,10 +39,6 @@ def test_a_killed_training_ends_with_the_same_policy(name, tmp_path, monkeypatch
     monkeypatch.setattr(module, "Trainer", trainer)
     cut = module.train(recipe, ROBOT, 0, tmp_path / "cut", quiet=True, resume=True)
     assert cut.policy.read_bytes() == whole.policy.read_bytes()
-    results = [json.loads((tmp_path / n / "result.json").read_text()) for n in ("whole", "cut")]
-    one, other = ([(s["name"], s["score_m"]) for s in r["stages"]] for r in results)
-    assert one == other
-    assert len(one) == {"sac": 0, "ppo": 0, "universal": 3}.get(name, 4)
 
 
 def test_only_whole_checkpoints_count_two_are_kept_and_no_code_in_them_runs(tmp_path):

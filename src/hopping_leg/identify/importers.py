@@ -75,9 +75,8 @@ def read_log(table: pl.DataFrame, path: Path) -> tuple[pl.DataFrame, RecordingMe
     RecordingError says that no rig has such columns, or that the path names another design of the
     rig than the robot's, e.g. designC0.
     """
-    others = {"time": "t"} | {c: f"{c[:-4]}_cmd" for c in table.columns if c.endswith("_des")}
-    others = {old: new for old, new in others.items() if new not in table.columns}
-    table = table.rename(others, strict=False)  # the same logs before they were converted
+    if "t" not in table.columns:  # the same logs before they were converted
+        table = table.rename({"time": "t"}, strict=False)
     known = (f for f in map(log_format, RIGS) if set(f.recognised_by).issubset(table.columns))
     rig = next(known, None)
     if rig is None:
@@ -93,6 +92,9 @@ def read_log(table: pl.DataFrame, path: Path) -> tuple[pl.DataFrame, RecordingMe
             f"{path} is of {design} by its name, but '{rig.metadata.robot}' is another robot;"
             " write its own robot file, and a sidecar that names it."
         )
+    own = set(rig.columns.values())  # some logs call commands desired
+    desired = {f"{c[:-4]}_des": c for c in own - set(table.columns) if c.endswith("_cmd")}
+    table = table.rename({k: c for k, c in desired.items() if k not in own}, strict=False)
     table = cast(table, {c: pl.String if c == "phase" else pl.Float64 for c in table.columns}, path)
     metadata = rig.metadata
     if rig.own_rate:

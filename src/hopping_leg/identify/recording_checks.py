@@ -81,6 +81,7 @@ def check_table(inspection: Inspection) -> None:
     _check_sizes(inspection)
     _check_motion(inspection)
     _check_jumps(inspection)
+    _check_signs(inspection)
     for joint, columns in enumerate(zip(PAIRS["position"], PAIRS["velocity"], strict=True)):
         _check_velocity(inspection, *columns)
         _check_torque(inspection, joint)
@@ -282,7 +283,7 @@ def _drop_spikes(inspection: Inspection, column: str, least: float, often: float
 
 
 def _check_jumps(inspection: Inspection) -> None:
-    """Refuse angles that jump, have another sign, or are beyond the robot's mechanical stops."""
+    """Refuse angles that jump, or are beyond the robot's mechanical stops."""
     for name, column in zip(JOINTS, PAIRS["position"], strict=True):
         known, steps, times = _steps(inspection, column)
         jumps = np.abs(steps) > np.maximum(_LEAP, _FASTEST * times)
@@ -295,14 +296,6 @@ def _check_jumps(inspection: Inspection) -> None:
         if (robot := inspection.robot) is None:
             continue
         joint, q = getattr(robot, name), inspection.floats(column)
-        stands = inspection.metadata.rig != "fixed-base" and len(known) > 0
-        middle = float(np.median(q[known])) if stands else np.nan
-        if joint.lower <= -middle <= joint.upper and not joint.lower <= middle <= joint.upper:
-            inspection.refuse(
-                f"column '{column}' is about {middle:.3g} rad, but a standing '{robot.name}' has"
-                f" {joint.lower:g} to {joint.upper:g}: change the joint's sign, that of its"
-                " velocity, torque and commands, too"
-            )
         low, high = joint.stop_lower - _OUTSIDE, joint.stop_upper + _OUTSIDE
         beyond = np.flatnonzero((q < low) | (q > high))
         if len(beyond) and high - low < _TURN:
@@ -311,6 +304,21 @@ def _check_jumps(inspection: Inspection) -> None:
                 f" {inspection.row(beyond[0])}, but the {name} of '{robot.name}' ends at"
                 f" {joint.stop_lower:g} and {joint.stop_upper:g}; check sign, zero and robot"
             )
+
+
+def _check_signs(inspection: Inspection) -> None:
+    """Refuse a standing leg one of whose joints has another sign; a mirrored leg is as good."""
+    robot, columns = inspection.robot, PAIRS["position"]
+    if robot is None or inspection.metadata.rig == "fixed-base":
+        return
+    about = [float(np.nanmedian([*inspection.floats(c), np.nan])) for c in columns]
+    usual = [joint.lower + joint.upper for joint in (robot.hip, robot.knee)]
+    if np.prod(np.sign([*about, *usual])) < 0:
+        inspection.refuse(
+            f"columns {' and '.join(columns)} are about {about[0]:.3g} and {about[1]:.3g} rad,"
+            f" which no standing '{robot.name}' has: change the sign of one of the joints, of its"
+            " velocity, torque and commands, too"
+        )
 
 
 _COMMON_PEAK = 60.0  # peak torque where the robot is unknown, N m

@@ -23,7 +23,7 @@ from hopping_leg.robot.robot_checks import check_physics, numbers
 
 _DELAY, _LATENCY = "drive.delay", "reality.latency.command"
 _WORSE, _JOINT_WORSE = 1.01, 1.2  # Mean factor on errors that is worse, of both joints and of one
-_FINE = {"rad": 1e-3, "N m": 0.02}  # Errors that are added: below them nothing is worse
+_FINE = {"rad": 1e-3, "N m": 0.02}  # Errors that are as good as none
 PARAMETERS = ("parameter", "start", "identified", "95 % interval", "unit")
 """What is shown of each parameter."""
 ERRORS = ("on held-out data, rms", "before: hip", "knee", "after: hip", "knee", "unit")
@@ -164,17 +164,16 @@ def quality_json(identified: Identified) -> list[dict[str, Any]]:
 
 def warning(identified: Identified) -> str:
     """Return a sentence if the fit errs more than its start on held-out data, else ""."""
-    worse, rows = dict[str, float](), quality_json(identified)
+    rows, worse = quality_json(identified), dict[str, float]()
     for joint in JOINTS:
         pairs = [
-            [row[f"{joint}_{t}"] + _FINE[row["unit"]] for t in ("before", "after")] for row in rows
+            [max(row[f"{joint}_{time}"], _FINE[row["unit"]]) for time in ("before", "after")]
+            for row in rows
         ]
         logs = [math.log(after / before) for before, after in pairs if after / before > 0]
-        worse |= {joint: math.exp(sum(logs) / len(logs))} if logs else {}
-    joint = max(worse, key=worse.__getitem__, default="")
-    if not worse or (
-        worse[joint] < _JOINT_WORSE and math.prod(worse.values()) < _WORSE ** len(worse)
-    ):
+        worse[joint] = math.exp(sum(logs) / max(len(logs), 1))
+    joint = max(worse, key=worse.__getitem__)
+    if worse[joint] < _JOINT_WORSE and math.prod(worse.values()) < _WORSE ** len(worse):
         return ""
     return (
         f"On data that it has not seen this fit errs {worse[joint]:.3g} times as much, {joint}, as"

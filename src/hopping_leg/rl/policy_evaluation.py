@@ -237,6 +237,5 @@ class Selection:
         results = evaluate_policy(policy, self._robot, commands, seeds, rate)
         return {
             "score_m": score(results),
-            "worst_score_m": max(map(command_score, results)),
             "trials": io.plain([asdict(v) for v in results]),
         }

@@ -19,7 +19,7 @@ from hopping_leg.envs.task import TaskLeg
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.dagger import DaggerConfig
 from hopping_leg.rl.onnx_export import every_centimetre
-from hopping_leg.rl.policy_evaluation import CommandResult, command_score, evaluate_policy
+from hopping_leg.rl.policy_evaluation import CommandResult, evaluate_policy
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot import Robot
 from hopping_leg.sim import NO_NOISE, compile_physics
@@ -34,8 +34,8 @@ _AT_ONCE = 8  # legs in one task of a worker; what it found is kept at its end
 _BETWEEN_SEEDS = 1_000_000  # legs of which no two trainings draw the same
 
 
-def within_reach(recipe: Recipe, robot: Robot) -> tuple[Recipe, float]:
-    """Return a recipe for the heights that its teacher reaches, and the teacher's worst score, m.
+def within_reach(recipe: Recipe, robot: Robot) -> Recipe:
+    """Return a recipe for the heights that its teacher reaches.
 
     A recipe without a teacher stays as it is. The heights are the longest run of centimetres
     without a skipped hop or a body on the ground, and with a small median error.
@@ -44,7 +44,7 @@ def within_reach(recipe: Recipe, robot: Robot) -> tuple[Recipe, float]:
         UsageError: There are none.
     """
     if not isinstance(recipe.algorithm, DaggerConfig):
-        return recipe, 0.0
+        return recipe
     rate, heights = recipe.task.rate, every_centimetre(recipe.task.command_bounds)
     teacher = TrueStateMpc(robot, recipe.algorithm.teacher, rate=rate)
     results = evaluate_policy(teacher, robot, heights, rate=rate, legs=2, seconds=5.0)
@@ -55,9 +55,9 @@ def within_reach(recipe: Recipe, robot: Robot) -> tuple[Recipe, float]:
             f" on {robot.name}; check masses, lengths and motors with `hop robots check`, or give"
             " other --heights."
         )
-    if len(longest) < len(heights):
-        recipe = recipe.within(longest[0].command_m, longest[-1].command_m)
-    return recipe, max(map(command_score, longest))
+    if len(longest) == len(heights):
+        return recipe
+    return recipe.within(longest[0].command_m, longest[-1].command_m)
 
 
 def _longest_run(

@@ -133,7 +133,7 @@ One network from joint measurements to joint torques, for {legs} {robot}
 
 - Training: {result["steps"]} control steps, {result["minutes"]:.1f} min of wall-clock time, physics
   step {1000 * task["timestep"]:g} ms.
-{_stages(result["stages"])}{chosen if tried > 1 else ""}- Versions: {versions}.
+{chosen if tried > 1 else ""}- Versions: {versions}.
 
 Trials on the selection seeds {", ".join(map(str, selected["seeds"]))}, noise and delay on, physics
 step {1000 * TIMESTEP:g} ms, the first 2 s of each trial dropped. These seeds chose the policy;
@@ -143,15 +143,6 @@ step {1000 * TIMESTEP:g} ms, the first 2 s of each trial dropped. These seeds ch
  | lowest base m |
 |---|---|---|---|---|---|---|---|
 {"".join(map(_row, selected["trials"]))}{missed_commands(selected["trials"])}"""
-
-
-def _stages(rows: list[dict[str, Any]]) -> str:
-    """Return lines on the stages of a distillation, if it was one."""
-    shown = "".join(
-        f"  - {row['name']}: score {_mm(row['score_m'])} mm after {row['seconds']:.0f} s\n"
-        for row in rows
-    )
-    return f"- Stages:\n{shown}" if rows else ""
 
 
 def _row(trial: dict[str, Any]) -> str:

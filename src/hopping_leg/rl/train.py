@@ -16,15 +16,10 @@ from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.envs import TaskLeg
 from hopping_leg.rl import onnx_export, reach, run_folder
 from hopping_leg.rl.checkpoint import write_checkpoint
-from hopping_leg.rl.dagger import DaggerConfig
 from hopping_leg.rl.policy_evaluation import FINAL_SEEDS, Selection, calibrate, input_range
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.terminal import Progress
-
-_STAGES = ("teacher", "student, helped", "student, alone", "student, calibrated")
-"""Parts of a distillation. Each ends with a score, m: median error and scatter at the worst height,
-or, while the teacher helps, the mean error of the student's hops."""
 
 _RANGE_LEGS, _RANGE_STRIDE = 24, 5
 """Legs of any size whose hops tell a policy's range of inputs, and which of their heights do."""
@@ -91,7 +86,7 @@ def train(
     with Progress(f"{title}, preparing", quiet=quiet) as progress:
         fitted = recipe.fit(robot)
         folder = run_folder.RunFolder(out, fitted, robot, seed, minutes)
-        recipe, worst_score = reach.within_reach(fitted, robot)
+        recipe = reach.within_reach(fitted, robot)
         new = run_folder.is_new(out, resume=resume)  # or refused, before a lock is put into it
         with locks.hold_folder(out, errors.UsageError):
             tree = folder.begin(new=new)
@@ -100,7 +95,6 @@ def train(
                 lambda share: progress.show(title, share, about=", trying legs"),
             )  # fmt: skip
             trainer = Trainer(recipe, robot, folder, legs, progress, threads, began)
-            trainer.end_stage(worst_score)
             trainer.learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
             if tree is not None:
                 trainer.restore(tree)
@@ -128,11 +122,6 @@ class Trainer:
         if minutes is not None:
             self.learner.remaining = lambda: max(0.0, 1 - self.elapsed / self._seconds)
         self.selection = Selection(recipe, robot, folder.path / "snapshots")
-        how = recipe.algorithm
-        self._helped = how.mixing_share if isinstance(how, DaggerConfig) else None
-        """Share of a distillation in which the teacher helps; None for other trainings."""
-        self.stages: list[dict[str, Any]] = []
-        """How the stages of a distillation ended so far, as JSON values."""
         self.seconds: dict[str, float] = {"before the first rollout": time.monotonic() - began}
         """Time spent on each part since the run began or was resumed."""
         self._earlier, self._began, self._saved = 0.0, began, time.monotonic()
@@ -151,8 +140,7 @@ class Trainer:
             raise errors.UsageError(
                 f"{self.folder.path} was begun by another version; train anew in another folder."
             ) from error
-        self.selection.rows, self.stages = tree["history"], tree["stages"]
-        self._earlier = tree["elapsed"]
+        self.selection.rows, self._earlier = tree["history"], tree["elapsed"]
         self._began = time.monotonic()
 
     def run(self, command: str) -> Trained:
@@ -174,7 +162,6 @@ class Trainer:
             "steps": steps,
             "selected": selected,
             "history": self.selection.rows,
-            "stages": self.stages,
             "seconds": self.seconds | learner.seconds,
         }
         self.folder.write_result(result)
@@ -185,11 +172,9 @@ class Trainer:
         """Return the selected policy, calibrated, and how it hops, as JSON values."""
         recipe = self.recipe
         content, selected = self.selection.choose()
-        self.end_stage(selected["worst_score_m"])
         if recipe.selection.calibrations:
             content = calibrate(content, self.robot, recipe.selection.calibrations)
             selected |= self.selection.trials(content, FINAL_SEEDS)
-            self.end_stage(selected["worst_score_m"])
         policy = Policy(content, "the selected policy", recipe.name)
         heights, legs = onnx_export.every_centimetre(recipe.task.command_bounds), [self.robot]
         if self.legs:
@@ -217,23 +202,14 @@ class Trainer:
         due = learner.num_timesteps >= self.selection.next_at
         if due and learner.share >= self.recipe.selection.eval_start:
             self._evaluate()
-        if self._helped is not None and len(self.stages) == 1 and learner.share >= self._helped:
-            self.end_stage(learner.task.mean_apex_error)
         if time.monotonic() - self._saved >= self.recipe.schedule.checkpoint_seconds:
             self.checkpoint()
-
-    def end_stage(self, score: float) -> None:
-        """Note how the present stage of a distillation ended."""
-        if self._helped is not None:
-            name = _STAGES[len(self.stages)]
-            self.stages.append({"name": name, "score_m": score, "seconds": self.elapsed})
 
     def checkpoint(self) -> None:
         """Write a checkpoint; only at a boundary does it continue exactly."""
         tree = {
             "learner": self.learner.state(),
             "history": self.selection.rows,
-            "stages": self.stages,
             "elapsed": self.elapsed,
         }
         write_checkpoint(self.folder.checkpoints, self.learner.num_timesteps, tree)

@@ -1,6 +1,4 @@
-"""The stages of a distillation: every one ends with a score."""
-
-import json
+"""A training: on which legs, at which heights, and what its card says."""
 
 import numpy as np
 import pytest
@@ -13,23 +11,6 @@ from hopping_leg.rl.run_folder import RunFolder
 from hopping_leg.rl.train import train
 from hopping_leg.robot import load_robot
 from tests.rl.learners import ROBOT, TINY_FAST, learn, learner, try_briefly
-
-
-def test_a_training_tells_how_its_stages_ended(tmp_path, monkeypatch):
-    try_briefly(monkeypatch)
-    train(TINY_FAST, ROBOT, 0, tmp_path, quiet=True)
-    result = json.loads((tmp_path / "result.json").read_text())
-    rows = result["stages"]
-    names = ["teacher", "student, helped", "student, alone", "student, calibrated"]
-    assert [row["name"] for row in rows] == names
-    assert [row["seconds"] for row in rows] == sorted(row["seconds"] for row in rows)
-    assert 0 < rows[0]["score_m"] < 0.006 < rows[2]["score_m"], "after seconds of training"
-    assert rows[3]["score_m"] == result["selected"]["worst_score_m"]
-    card = (tmp_path / "model_card.md").read_text()
-    assert "\namong them the age of each joint sample, which the paper's 15 lack" in card
-    for row in rows:
-        told = f"score {1000 * row['score_m']:.1f} mm after {row['seconds']:.0f} s"
-        assert f"  - {row['name']}: {told}" in card
 
 
 def test_a_leg_with_a_belt_and_jitter_is_trained_on_as_its_motors_see_it(tmp_path, monkeypatch):
@@ -50,7 +31,7 @@ def test_a_leg_with_a_belt_and_jitter_is_trained_on_as_its_motors_see_it(tmp_pat
 
 def test_a_run_is_known_by_what_was_asked_and_its_card_says_what_is_in_reach(tmp_path, monkeypatch):
     def within_reach(recipe, robot):
-        return recipe.replace({"task.command_range": (0.28, 0.30)}, eval_commands=(0.29,)), 0.001
+        return recipe.replace({"task.command_range": (0.28, 0.30)}, eval_commands=(0.29,))
 
     try_briefly(monkeypatch)
     monkeypatch.setattr(reach, "within_reach", within_reach)
@@ -58,3 +39,5 @@ def test_a_run_is_known_by_what_was_asked_and_its_card_says_what_is_in_reach(tmp
     RunFolder(tmp_path, TINY_FAST.fit(ROBOT), ROBOT, 0, None).check_same()
     card = Policy.load(trained.policy).card
     assert (card.command_low, card.command_high) == (0.28, 0.30)
+    told = (tmp_path / "model_card.md").read_text()
+    assert "\namong them the age of each joint sample, which the paper's 15 lack" in told
