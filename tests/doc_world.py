@@ -1,10 +1,7 @@
 """What stands around the commands of the documentation: what makes them short, and their files."""
 
-import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import polars.selectors as cs
@@ -13,7 +10,7 @@ from hopping_leg import cli
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.flight_recorder import FlightRecorder
-from hopping_leg.robot import JOINTS, load_robot
+from hopping_leg.robot import load_robot
 from hopping_leg.sim.randomization import draw_twin
 from hopping_leg.trace import Trace
 from tests.doc_pages import ROOT, blocks
@@ -54,17 +51,16 @@ CODES = {
 }
 """Exit codes other than 0: a training that is interrupted, a straight leg that is not armed."""
 
-CLAIMS: dict[str, Callable[[dict[str, Any]], bool]] = {
-    "environment": lambda names: names["model"].num_timesteps == 2048,
-    "identify": lambda _: all(
-        row[f"{joint}_after"] < row[f"{joint}_before"]
-        for row in _rows("identified.json", "quality")[:1]
-        for joint in JOINTS
-    ),
-    "robot": lambda _: all(r["hops"] for r in _rows("runs/heron/first/evaluation.json", "summary")),
+AFTER = {
+    "environment": "assert model.num_timesteps == 2048",
+    "identify": """import json; from pathlib import Path
+row = json.loads(Path("identified.json").read_text())["quality"][0]
+assert all(row[f"{joint}_after"] < row[f"{joint}_before"] for joint in ("hip", "knee"))""",
+    "robot": """import json; from pathlib import Path
+rows = json.loads(Path("runs/heron/first/evaluation.json").read_text())["summary"]
+assert all(row["hops"] for row in rows)""",
 }
-"""What holds at the end of a page whose snippets left some names, beyond commands that end well."""
-
+"""Python that holds at the end of a page."""
 
 BEFORE = {"own-controller": "class TheirController:\n    def __init__(self, mass, dt): pass"}
 """Python that a page takes for granted."""
@@ -105,10 +101,6 @@ def write_tutorial() -> None:
     """Write the file that the page on own controllers lets the reader write."""
     code = [b.text for b in blocks("own-controller") if b.language == "python"][:3]
     Path("first.py").write_text("\n\n".join(code))
-
-
-def _rows(file: str, name: str) -> list[dict[str, Any]]:
-    return json.loads(Path(file).read_text())[name]
 
 
 def _trained_policy() -> None:

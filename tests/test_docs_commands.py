@@ -21,16 +21,15 @@ import numpy as np
 import pytest
 
 from hopping_leg import cli
-from hopping_leg.controllers import RolloutConfig, rollout
-from hopping_leg.controllers.registry import load_controller, robot_of
-from hopping_leg.evaluate.metrics import measure
-from hopping_leg.evaluate.statistics import of
-from hopping_leg.robot import DEFAULT_ROBOT, load_robot
+from hopping_leg.controllers import RolloutConfig
+from hopping_leg.controllers.registry import robot_of
+from hopping_leg.evaluate.runner import evaluate, load_entries
+from hopping_leg.robot import CONTROL_RATE, DEFAULT_ROBOT, load_robot
 from tests.cli.emulated import put_behind
 from tests.doc_pages import PAGES, ROOT, blocks, inline_commands, text_of
 from tests.doc_world import (
+    AFTER,
     BEFORE,
-    CLAIMS,
     CODES,
     ELSEWHERE,
     SECONDS,
@@ -72,23 +71,20 @@ def test_options_in_running_text_exist_and_blocks_of_toml_are_toml(page):
 def test_the_tutorials_controllers_hop_as_its_table_says(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_tutorial()
-    leg, commands = load_robot(DEFAULT_ROBOT), np.array([0.25, 0.30, 0.35])
-    apexes = {}
-    for name, *cells in re.findall(
-        r"\| `(\w+)` " + 3 * r"\| (.*) " + r"\|", text_of("own-controller")
-    ):
-        controller = load_controller(f"first.py:{name}", leg)
-        run = rollout(controller, RolloutConfig(leg), np.tile(commands, (3000, 1)), seed=0)
-        found = [measure(run.trace(number))[0].apex for number in range(3)]
-        apexes[name] = np.array([of(np.median, apex) for apex in found])
-        said = [cell.split(" ± ") if "±" in cell else ["nan", "nan"] for cell in cells]
-        error, std = 1e-3 * np.array(said, float).T  # the noise was other than here
-        far = np.abs(apexes[name] - commands - error) - std
-        assert (np.isnan(error) == np.isnan(apexes[name])).all()
-        assert not (far > 0.005).any(), name
-    assert np.isnan(apexes["Spring"]).all()
-    assert np.ptp(apexes["Pushing"]) < 0.003
-    assert (np.diff(apexes["Aiming"]) > 0.02).all()
+    table = re.findall(r"\| `(\w+)` " + 3 * r"\| (.*) " + r"\|", text_of("own-controller"))
+    leg, commands = load_robot(DEFAULT_ROBOT), (0.25, 0.30, 0.35)
+    entries = load_entries([f"first.py:{name}" for name, *_ in table], leg, CONTROL_RATE)
+    setup = RolloutConfig(leg)
+    judged = evaluate(entries, setup, commands=commands, repeats=1, seed=0, kinds=("fixed",))
+    rows = judged.evaluation.summary
+    for row, cell in zip(rows, [cell for _, *cells in table for cell in cells], strict=True):
+        assert (row.hops > 0) == ("±" in cell) == ("Spring" not in row.controller)
+        if row.hops:  # the table's noise was another
+            error, std = (float(part) / 1e3 for part in cell.split(" ± "))
+            assert abs(row.median_error_m - error) < std + 0.005, row.controller
+    apexes = [row.command_m + row.median_error_m for row in rows]
+    assert np.ptp(apexes[3:6]) < 0.003, "Pushing"
+    assert (np.diff(apexes[6:]) > 0.02).all(), "Aiming"
 
 
 @pytest.mark.slow
@@ -108,7 +104,7 @@ def test_commands_and_snippets_work_in_their_order(page, tmp_path, monkeypatch):
         for words in block.commands() if block.language == "bash" else ():
             print("$", *words)
             run(words, monkeypatch)
-    assert page not in CLAIMS or CLAIMS[page](names)
+    exec(AFTER.get(page, ""), names)
 
 
 def run(words, monkeypatch):

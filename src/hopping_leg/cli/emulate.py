@@ -116,11 +116,9 @@ class _Events:
         for name, old, drive in zip(JOINTS, before, self._robot.drives, strict=True):
             mode = drive.machine.mode
             if mode is not old:
-                why = _why(drive.machine.fault) if mode is DriveMode.FAULT else ""
-                text = mode.name.lower().replace("_", " ")
-                print(f"{self._robot.time:7.3f} s  {name}: {text}{why}", flush=True)
-
-
-def _why(code: int) -> str:
-    known = [kind(code) for kind in (FaultCode, Notice) if code in set(kind)]
-    return f" {code}: {known[0].name.lower().replace('_', ' ') if known else 'unknown'}"
+                code, text = drive.machine.fault, mode.name
+                if mode is DriveMode.FAULT:
+                    known = [kind(code).name for kind in (FaultCode, Notice) if code in set(kind)]
+                    text = f"{text} {code}: {known[0] if known else 'unknown'}"
+                text = text.lower().replace("_", " ")
+                print(f"{self._robot.time:7.3f} s  {name}: {text}", flush=True)

@@ -94,7 +94,7 @@ def read_log(table: pl.DataFrame, path: Path) -> tuple[pl.DataFrame, RecordingMe
         )
     own = set(rig.columns.values())  # some logs call commands desired
     desired = {f"{c[:-4]}_des": c for c in own - set(table.columns) if c.endswith("_cmd")}
-    table = table.rename({k: c for k, c in desired.items() if k not in own}, strict=False)
+    table = table.rename(desired, strict=False)
     table = cast(table, {c: pl.String if c == "phase" else pl.Float64 for c in table.columns}, path)
     metadata = rig.metadata
     if rig.own_rate:

@@ -312,8 +312,7 @@ def _check_signs(inspection: Inspection) -> None:
     if robot is None or inspection.metadata.rig == "fixed-base":
         return
     about = [float(np.nanmedian([*inspection.floats(c), np.nan])) for c in columns]
-    usual = [joint.lower + joint.upper for joint in (robot.hip, robot.knee)]
-    if np.prod(np.sign([*about, *usual])) < 0:
+    if np.prod(np.sign([*about, *(j.lower + j.upper for j in (robot.hip, robot.knee))])) < 0:
         inspection.refuse(
             f"columns {' and '.join(columns)} are about {about[0]:.3g} and {about[1]:.3g} rad,"
             f" which no standing '{robot.name}' has: change the sign of one of the joints, of its"
