@@ -9,7 +9,7 @@ that is one update older, it forgets how to hop as the noise falls.
 import copy
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -162,7 +162,7 @@ class PPO(Learner):
         moved = []
         epochs, size = range(config.n_epochs), len(actions)
         orders = (torch.randperm(size, generator=self._draws) for _ in epochs)
-        for rows in (rows for order in orders for rows in order.split(config.batch_size)):
+        for rows in (rows for order in orders for rows in torch.split(order, config.batch_size)):
             mean = self.actor(observations[rows])
             now = -0.5 * ((actions[rows] - mean) / rollout.std).square().sum(dim=-1)
             ratio = torch.exp(now - before[rows])
