@@ -16,6 +16,7 @@ import jinja2
 import numpy as np
 import wasm
 
+from hopping_leg.cli import DEMO
 from hopping_leg.controllers import registry, robot_numbers
 from hopping_leg.controllers.energy_shaping import EnergyShaping
 from hopping_leg.controllers.observation_history import OBSERVATION_HISTORIES, AnyLeg, Dated
@@ -42,7 +43,7 @@ from hopping_leg.viewer import live_leg
 
 FOLDER = Path(__file__).parent / "live"
 MODULES = sorted(file.stem for file in FOLDER.glob("*.js"))
-CONTROLLERS = ("fast", registry.ENERGY_SHAPING, "rl", "universal", "paper")
+CONTROLLERS = (*DEMO, "rl", "fast", "paper")
 """In the order of the lists; the first two hop first."""
 
 _PACKAGE = resources.files("hopping_leg")

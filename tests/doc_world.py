@@ -51,6 +51,17 @@ CODES = {
 }
 """Exit codes other than 0: a training that is interrupted, a straight leg that is not armed."""
 
+AFTER = {
+    "environment": "assert model.num_timesteps == 2048",
+    "identify": """import json; from pathlib import Path
+row = json.loads(Path("identified.json").read_text())["quality"][0]
+assert all(row[f"{joint}_after"] < row[f"{joint}_before"] for joint in ("hip", "knee"))""",
+    "robot": """import json; from pathlib import Path
+rows = json.loads(Path("runs/heron/first/evaluation.json").read_text())["summary"]
+assert all(row["hops"] for row in rows)""",
+}
+"""Python that holds at the end of a page."""
+
 BEFORE = {"own-controller": "class TheirController:\n    def __init__(self, mass, dt): pass"}
 """Python that a page takes for granted."""
 
@@ -65,15 +76,20 @@ def shorten(words: list[str]) -> list[str]:
 
 
 def furnish(page: str) -> None:
-    """Put the files that a page takes for granted into the current folder."""
-    shutil.copytree(ROOT / "examples", "examples")
-    shutil.copy("examples/my_leg.toml", "my_leg.toml")
+    """Put what a page takes for granted, or lets the reader write, into the current folder."""
+    code = "\n\n".join(b.text for b in blocks(page) if b.language in ("bash", "python"))
+    if "examples/" in code:
+        shutil.copytree(ROOT / "examples", "examples")
+    if "my_leg.toml" in code:
+        legs = [b.text for b in blocks(page) if b.text.startswith('name = "my-leg"')]
+        text = legs[0] if legs else (ROOT / "examples/my_leg.toml").read_text()
+        Path("my_leg.toml").write_text(text)
     Path("runs/deploy").mkdir(parents=True)
     make = {
         "deploy": (_wired_leg, _killed_run),
         "evaluation": (_trained_policy,),
         "other-tools": (_bag, _stored_trial, _trained_policy),
-        "own-controller": (_first_controller,),
+        "own-controller": (write_tutorial,),
         "transfer": (lambda: draw_twin(0).save(Path("my_twin.toml")),),
         "viewer": (_stored_trial, _killed_run),
     }
@@ -81,8 +97,8 @@ def furnish(page: str) -> None:
         part()
 
 
-def _first_controller() -> None:
-    """Write what the page lets the reader write."""
+def write_tutorial() -> None:
+    """Write the file that the page on own controllers lets the reader write."""
     code = [b.text for b in blocks("own-controller") if b.language == "python"][:3]
     Path("first.py").write_text("\n\n".join(code))
 

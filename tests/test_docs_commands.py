@@ -17,13 +17,26 @@ import tomllib
 from pathlib import Path
 from unittest.mock import Mock
 
+import numpy as np
 import pytest
 
 from hopping_leg import cli
+from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.registry import robot_of
+from hopping_leg.evaluate.runner import evaluate, load_entries
+from hopping_leg.robot import CONTROL_RATE, DEFAULT_ROBOT, load_robot
 from tests.cli.emulated import put_behind
-from tests.doc_pages import PAGES, ROOT, blocks, inline_commands
-from tests.doc_world import BEFORE, CODES, ELSEWHERE, SECONDS, furnish, shorten
+from tests.doc_pages import PAGES, ROOT, blocks, inline_commands, text_of
+from tests.doc_world import (
+    AFTER,
+    BEFORE,
+    CODES,
+    ELSEWHERE,
+    SECONDS,
+    furnish,
+    shorten,
+    write_tutorial,
+)
 
 pytest.importorskip("moteus")
 pytest.importorskip("torch")
@@ -55,6 +68,25 @@ def test_options_in_running_text_exist_and_blocks_of_toml_are_toml(page):
                 assert re.search(rf"{flag}\b", help_of(verb, *kinds)), (verb, *words)
 
 
+def test_the_tutorials_controllers_hop_as_its_table_says(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_tutorial()
+    table = re.findall(r"\| `(\w+)` " + 3 * r"\| (.*) " + r"\|", text_of("own-controller"))
+    leg, commands = load_robot(DEFAULT_ROBOT), (0.25, 0.30, 0.35)
+    entries = load_entries([f"first.py:{name}" for name, *_ in table], leg, CONTROL_RATE)
+    setup = RolloutConfig(leg)
+    judged = evaluate(entries, setup, commands=commands, repeats=1, seed=0, kinds=("fixed",))
+    rows = judged.evaluation.summary
+    for row, cell in zip(rows, [cell for _, *cells in table for cell in cells], strict=True):
+        assert (row.hops > 0) == ("±" in cell) == ("Spring" not in row.controller)
+        if row.hops:  # the table's noise was another
+            error, std = (float(part) / 1e3 for part in cell.split(" ± "))
+            assert abs(row.median_error_m - error) < std + 0.005, row.controller
+    apexes = [row.command_m + row.median_error_m for row in rows]
+    assert np.ptp(apexes[3:6]) < 0.003, "Pushing"
+    assert (np.diff(apexes[6:]) > 0.02).all(), "Aiming"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("page", RUNNABLE)
 def test_commands_and_snippets_work_in_their_order(page, tmp_path, monkeypatch):
@@ -72,6 +104,7 @@ def test_commands_and_snippets_work_in_their_order(page, tmp_path, monkeypatch):
         for words in block.commands() if block.language == "bash" else ():
             print("$", *words)
             run(words, monkeypatch)
+    exec(AFTER.get(page, ""), names)
 
 
 def run(words, monkeypatch):

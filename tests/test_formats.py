@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hopping_leg.cli import main
 from hopping_leg.errors import RecordingError, TraceError
-from hopping_leg.formats import COLUMNS, JOINT_STATE, STATES, bag_files, read_bag
+from hopping_leg.formats import COLUMNS, FLOATS, JOINT_STATE, STATES, bag_files, read_bag
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.robot import load_robot
 from hopping_leg.trace import COLUMNS as TRACED
@@ -118,6 +118,14 @@ def test_a_sidecar_names_joints_that_are_called_otherwise(tmp_path):
     np.testing.assert_array_equal(found, swinging(50)["knee_position_rad"])
 
 
+def test_numbers_of_an_array_are_named_by_their_place(tmp_path):
+    record(tmp_path / "bag", "mcap", swinging(40), arrays={"effort/commands": [0.5, -0.25]})
+    names = 'hip_command_nm = "effort/commands[0]"\nknee_command_nm = "effort/commands[1]"'
+    (tmp_path / "bag.toml").write_text(f"{SIDECAR}[columns]\n{names}")
+    found = load_recording(tmp_path / "bag").array("torque_command")
+    np.testing.assert_array_equal(found, np.tile([0.5, -0.25], (40, 1)))
+
+
 def test_what_is_no_bag_is_said_in_a_sentence(tmp_path):
     path = written(tmp_path, noise())
     path.write_bytes(path.read_bytes()[:-500])
@@ -130,20 +138,24 @@ def test_what_is_no_bag_is_said_in_a_sentence(tmp_path):
         to_mcap(Trace(pl.DataFrame({"time_s": [-1.0]})))
 
 
-def record(path, storage, *tables, start=0, topic=None, joints=("hip", "knee")):
+def record(path, storage, *tables, start=0, topic=None, joints=("hip", "knee"), arrays=None):
     """Write tables of a recording's columns, one after another, with an independent library."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
     types = get_typestore(Stores.ROS2_HUMBLE)
-    kinds = (JOINT_STATE, "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
-    message, header, time = (types.types[name] for name in kinds)
+    kinds = (JOINT_STATE, "std_msgs/msg/Header", "builtin_interfaces/msg/Time", FLOATS)
+    message, header, time, floats = (types.types[name] for name in kinds)
+    layout = types.types["std_msgs/msg/MultiArrayLayout"]([], 0)
     with Writer(path, version=9, storage_plugin=StoragePlugin[storage.upper()]) as bag:
         topics = {
             name: bag.add_connection(topic or f"/{name}", JOINT_STATE, typestore=types)
             for name in COLUMNS
             if topic is None or name == STATES
         }
+        for name, values in (arrays or {}).items():
+            raw = types.serialize_cdr(floats(layout, np.array(values)), FLOATS)
+            bag.write(bag.add_connection(f"/{name}", FLOATS, typestore=types), 0, raw)
         for row in (row for table in tables for row in table.iter_rows(named=True)):
             stamp = round(1e9 * row["time_s"]) + start * 10**9
             for name, connection in topics.items():

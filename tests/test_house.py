@@ -7,23 +7,23 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 CEILINGS = {
-    "src/hopping_leg/*.py": (12, 1155),
-    "src/hopping_leg/cli/**/*.py": (16, 1865),
+    "src/hopping_leg/*.py": (12, 1150),
+    "src/hopping_leg/cli/**/*.py": (16, 1870),
     "src/hopping_leg/controllers/**/*.py": (20, 2540),
     "src/hopping_leg/deploy/**/*.py": (20, 3187),
     "src/hopping_leg/emulator/**/*.py": (14, 1830),
     "src/hopping_leg/envs/**/*.py": (10, 1440),
     "src/hopping_leg/evaluate/**/*.py": (13, 2015),
     "src/hopping_leg/formats/**/*.py": (1, 185),
-    "src/hopping_leg/identify/**/*.py": (21, 4350),
-    "src/hopping_leg/rl/**/*.py": (19, 2600),
-    "src/hopping_leg/robot/**/*.py": (13, 1975),
-    "src/hopping_leg/sim/**/*.py": (11, 2575),
+    "src/hopping_leg/identify/**/*.py": (21, 4382),
+    "src/hopping_leg/rl/**/*.py": (19, 2550),
+    "src/hopping_leg/robot/**/*.py": (13, 1995),
+    "src/hopping_leg/sim/**/*.py": (11, 2550),
     "src/hopping_leg/viewer/**/*.py": (6, 1026),
-    "src/**/*.py": (176, 26690),
-    "tests/**/*.py": (137, 14050),
+    "src/**/*.py": (176, 26705),
+    "tests/**/*.py": (137, 14170),
     "studies/**/*.py": (73, 7690),
-    "docs/**/*.md": (22, 2520),
+    "docs/**/*.md": (22, 2500),
     "docs/live/*.js": (13, 1490),
 }
 """Files and lines at most. Who raises one says what users gain by it."""

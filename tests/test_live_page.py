@@ -194,6 +194,7 @@ def test_the_page_obeys(live_page):
     page.keyboard.press("k")
     assert page.locator("#height-value").inner_text() in ("0.355 m", "0.360 m")
     policy = (resources.files("hopping_leg") / "policies/paper.onnx").read_bytes()
+    page.get_by_label("Controller", exact=True).first.select_option("fast")
     page.get_by_label("Robot", exact=True).select_option("legv2")
     page.get_by_text("fast was trained on legv2-identified, not on legv2.").wait_for()
     for name, content, says in (

@@ -110,7 +110,7 @@ class RayWorkers:
 
     def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> Iterator[R]:
         """As ``ProcessWorkers`` does; a task that dies begins again, the function is sent once."""
-        sent, task = self._ray.put(function), self._ray.remote(_call)
+        sent, task = self._ray.put(function), self._ray.remote(lambda f, *values: f(*values))
         begun = (task.remote(sent, *values) for values in arguments)
         try:
             yield from _in_order(begun, self._ray.get, self.count)
@@ -133,10 +133,6 @@ def _in_order(begun: Iterator[T], result: Callable[[T], R], count: int) -> Itera
         if len(waiting) == 2 * count:
             yield result(waiting.popleft())
     yield from map(result, waiting)
-
-
-def _call(function: Callable[..., Any], *values: Any) -> Any:  # noqa: ANN401
-    return function(*values)
 
 
 def _knock(address: str | None) -> None:

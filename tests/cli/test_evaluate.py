@@ -14,8 +14,10 @@ from tests.doc_pages import ROOT
 
 def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys):
     out = tmp_path / "run"
-    words = ["evaluate", "spring", "--commands", "0.3", "--seeds", "1"]
-    assert main([*words, "--threads", "1", "--out", str(out)]) == 0
+    words = ["evaluate", "spring", "--commands", "0.3", "--seeds", "1", "--threads", "1"]
+    assert main([*words, "--json", str(tmp_path / "own.json")]) == 0
+    assert json.loads((tmp_path / "own.json").read_text())["secondary"] is None, "the same floor"
+    assert main([*words, "--robot", "legv2-paper", "--out", str(out)]) == 0
     data = json.loads((out / "evaluation.json").read_text())
     assert [row["command_m"] for row in data["summary"]] == [0.3]
     assert data["command"].startswith("hop evaluate spring --commands 0.3 --seeds 1")

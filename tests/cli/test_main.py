@@ -1,5 +1,6 @@
 import errno
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg import cli
-from hopping_leg.cli import main
+from hopping_leg.cli import FAILED, main
 from hopping_leg.cli.options import Heights
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot, load_tree, numbers, shipped_robots
@@ -142,6 +143,13 @@ def test_what_a_terminal_cannot_encode_is_replaced(tmp_path):
     assert done.returncode == 0, done.stderr
     assert f"Wrote {tmp_path}/?/fast.onnx" in done.stdout.decode("ascii")
     assert sorted(path.name for path in tmp_path.iterdir()) == [folder.name], "onnxruntime, mujoco"
+
+
+def test_a_renderer_that_is_not_there_is_one_sentence():
+    words = [sys.executable, "-m", "hopping_leg.cli", "robots", "list"]
+    done = subprocess.run(words, capture_output=True, env={**os.environ, "MUJOCO_GL": "osmosis"})
+    assert done.returncode == FAILED
+    assert re.fullmatch(rb"hop: .*MUJOCO_GL=osmosis.*unset.*\n", done.stderr)
 
 
 def test_mujoco_writes_no_log_into_the_users_folder(tmp_path):

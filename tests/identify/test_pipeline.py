@@ -175,6 +175,7 @@ def test_a_plan_has_short_windows_where_nothing_holds_the_leg_and_begins_at_doub
 ANGLES = ("position", "position_command")
 OF_A_JOINT = (*ANGLES, "velocity", "torque", "velocity_command")
 COMMANDS = ("position_command", "velocity_command")
+TURNED = (*ANGLES, "velocity", "velocity_command")
 
 
 @pytest.mark.parametrize("joint", [0, 1])
@@ -185,13 +186,14 @@ COMMANDS = ("position_command", "velocity_command")
         (("torque",), lambda column: -column, "zoh", "sign"),
         (ANGLES, lambda column: column + np.pi / 2, "zoh", "zero"),
         (ANGLES, lambda column: column + np.pi, "zoh", "zero"),
+        (TURNED, lambda column: column / (2 * np.pi), "zoh", "revolutions for radians"),
         (("position",), lambda column: column * None, "zoh", "no positions of the .*both joints"),
         (COMMANDS, lambda column: column * None, "torque", "has no commanded torques"),
         (COMMANDS, lambda column: column * None, "continuous", "has no targets of its"),
     ],
 )
 def test_what_cannot_be_the_leg_is_refused_before_any_fit(names, change, onboard, sentence, joint):
-    joints = (0, 1) if names is COMMANDS else (joint,)
+    joints = (0, 1) if names in (COMMANDS, TURNED) else (joint,)
     columns = pl.col([PAIRS[name][j] for name in names for j in joints])
     wrong = changed(tracked(), change(columns)).with_metadata(onboard=onboard)
     with pytest.raises(RecordingError, match=sentence):

@@ -51,6 +51,7 @@ def test_every_form_of_a_table_reads_the_same(tmp_path, mark, comment):
     foreign = tmp_path / "run.parquet"
     pl.read_csv(path).write_parquet(foreign)
     text = f"{comment}\n" + path.read_text().replace(",", mark).replace("\n", "\r\n")
+    text = text.replace(".", ",") if mark == ";" else text  # as where decimals have a comma
     other, packed = tmp_path / "run.txt", tmp_path / "run.csv.gz"
     other.write_text(text, encoding="utf-8-sig" if not comment else "utf-8")
     packed.write_bytes(gzip.compress(other.read_bytes()))
@@ -65,8 +66,14 @@ def test_every_form_of_a_table_reads_the_same(tmp_path, mark, comment):
         (b"0,1\n1,2\n", "has no header"),
         (b"a,a\n1,2\n", "equal names"),
         (b"a,b\n1,2\n\n3\n", "row 1 has fewer fields than the 2 of the header"),
+        (b"a,b,c\n1,2\n3,4\n", "rows have 2 fields, all others than the 3 names"),
+        (b'a\n1,"2,0"\n3,4\n', "rows have 2 fields, all others than the 1 names"),
+        (b"# time_s,a\n0,1\n1,2\n", "has no header.*without a #"),
         (gzip.compress(b"a,b\n1,2\n", mtime=0)[:-6], "no whole table"),
-        (b"time_s,hip_position_rad\ns,0\n", "column 'time_s' must hold Float64.*\"s\""),
+        (
+            b"time_s,hip_position_rad\ns,0\n",
+            "column 'time_s' must hold Float64.*\"s\".*row of units",
+        ),
     ],
 )
 def test_what_is_no_table_is_refused(tmp_path, content, named):
@@ -84,6 +91,15 @@ def test_a_rigs_own_log_is_known_by_either_name_of_its_clock(tmp_path, clock):
     assert load_recording(path).metadata.robot == "doublependulum"
     with pytest.raises(RecordingError, match=r"design C\.0.*another robot.*sidecar"):
         load_recording(other)
+
+
+def test_commands_that_a_known_rigs_log_calls_desired_are_read(tmp_path):
+    names = log_format("legv2_boom").columns
+    log = swinging(rate=130.0).with_columns(pl.col(POSITIONS[0]) + 0.7, phase=pl.lit("HOP"))
+    log = log.rename({c: own.replace("_cmd", "_des") for c, own in names.items() if c in log})
+    log.write_csv(tmp_path / "log.csv")
+    assert "hip_tau_des" in log
+    assert load_recording(tmp_path / "log.csv").has("torque_command")
 
 
 def test_a_sidecar_may_name_the_columns(tmp_path):

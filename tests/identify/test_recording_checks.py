@@ -93,6 +93,17 @@ def test_a_coarse_clock_is_refused_unless_it_counts_in_periods(tick, rate):
         clocked(np.round(time, 7), rate)
 
 
+@pytest.mark.parametrize("joint", [0, 1])
+def test_a_joint_of_another_sign_is_refused_where_the_leg_stands(joint):
+    flipped = [-pl.col(PAIRS[name][joint]) for name in ("position", "velocity")]
+    table = swinging().with_columns(pl.col(HIP) + 0.7)
+    assert load(table, rig="rail").warnings == load(table.with_columns(flipped)).warnings == ()
+    with pytest.raises(RecordingError, match="change the sign of one of the joints"):
+        load(table.with_columns(flipped), rig="rail")
+    both = [-pl.col(name) for pair in ("position", "velocity") for name in PAIRS[pair]]
+    assert load(table.with_columns(both), rig="rail").warnings == ()
+
+
 def test_a_fine_clock_a_whole_period_or_jitter_is_believed():
     time = np.arange(600) / 200
     rng = np.random.default_rng(0)

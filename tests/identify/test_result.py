@@ -1,11 +1,13 @@
 import dataclasses
 import json
+import re
 import tomllib
 
 import numpy as np
 import pytest
 
 from hopping_leg.errors import UsageError
+from hopping_leg.identify import result, validation
 from hopping_leg.identify.report import write_fit_report
 from hopping_leg.identify.result import as_json, posterior_robots, save_robot, shown_errors
 from hopping_leg.io import write_json
@@ -24,7 +26,6 @@ def test_the_result_says_what_it_was_made_from_how_it_was_judged_and_within_whic
     assert tree["robot_digest"] == identified().robot.digest
     (one,) = tree["search"]["passes"]
     assert one["history"][-1] == one["cost"]
-    assert (one["other_starts"], tree["search"]["scoring"]["velocity"]) == ([], None)
     for part in (tree["validation"], tree["start_validation"]):
         assert {len(part[name]) for name in CLOSED_LOOP} == {2}
         horizons = part["open_loop_position_rms_rad"]
@@ -80,6 +81,21 @@ def test_what_does_not_exist_is_null_and_nobody_tells_of_it():
     mute = dataclasses.replace(found.validation, closed_loop_torque_rms_nm=(np.nan, np.nan))
     rows = shown_errors(dataclasses.replace(found, validation=mute))
     assert [row.count("-") for row in rows] == [0, 2, 0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("after", "said"),
+    [((0.005, 0.1), r"2\.44 times as much, knee"), ((0.09, 0.04), ""), ((0.07, 0.0002), "")],
+)
+def test_the_worse_joint_decides_whether_a_fit_is_worse(after, said):
+    """A fit that is far better at the hip hides no knee; nobody minds a tenth of a mrad."""
+    before = (0.093, 0.041) if after[1] > 1e-3 else (0.093, 0.0001)
+    unknown = (np.nan, np.nan)
+    judged = [validation.Validation(unknown, unknown, {"0.2": pair}) for pair in (after, before)]
+    found = dataclasses.replace(identified(), validation=judged[0], start_validation=judged[1])
+    assert re.search(said or "^$", result.warning(found))
+    errs = f"0.2 s ahead, rms: hip {1e3 * after[0]:.3g} mrad (93 before), knee {1e3 * after[1]:.3g}"
+    assert errs in result.verdict(found)
 
 
 def test_every_identified_number_says_so_below_its_provenance_and_all_others_stay(tmp_path):

@@ -1,4 +1,4 @@
-"""A training as a whole: what it is asked for, and what it makes."""
+"""A training: on which legs, at which heights, and what its card says."""
 
 import numpy as np
 import pytest

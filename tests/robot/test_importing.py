@@ -198,6 +198,16 @@ def test_a_foot_that_the_file_does_not_say_is_as_far_from_the_knee_as_is_given(t
     assert (leg.shank.length, leg.shank.com) == (0.2, pytest.approx(0.07 * 0.13 / 0.148, rel=1e-3))
 
 
+def test_what_a_file_hardly_means_is_doubted(tmp_path):
+    file = tmp_path / "leg.urdf"
+    file.write_text(EXAMPLE)
+    assert read_leg(file).doubts == []
+    file.write_text(EXAMPLE.replace('value="0.42"', 'value="0"').replace('"2.5"', '"143"'))
+    weightless, far = read_leg(file).doubts
+    assert "'carriage' weighs nothing" in weightless
+    assert "'knee_pitch' ends at 0 and 143 rad: in degrees?" in far
+
+
 def test_joints_that_are_not_the_legs_are_held_and_named(tmp_path):
     path = tmp_path / "leg.urdf"
     path.write_text(LEG.replace('name="foot_tip" type="fixed"', 'name="ankle" type="continuous"'))

@@ -93,7 +93,9 @@ def test_a_value_in_another_unit_is_doubted_where_it_stands(tmp_path, number, da
     factor = data.draw(st.sampled_from(OTHER_UNITS[entry["unit"]]))
     value = (entry["value"] * factor, entry["unit"])
     found = said(written(tmp_path / "leg.toml", {path: value}, "legv2"))
-    assert any(f"'{path.partition('.')[0]}." in sentence for sentence in found)
+    exact = path.endswith((".mass", ".length", ".rotor_inertia"))
+    named = f"'{path}'" if exact else f"'{path.partition('.')[0]}."
+    assert any(named in sentence for sentence in found)
 
 
 @pytest.mark.parametrize(("upper", "doubted"), [(-0.1, True), (0.25, True), (0.9, False)])
@@ -101,6 +103,14 @@ def test_a_leg_whose_foot_never_comes_below_the_hip_is_doubted(tmp_path, upper, 
     limits = {"hip.lower": (-1.2, "rad"), "hip.upper": (upper, "rad")}
     found = doubts(written(tmp_path / "leg.toml", limits))
     assert any("never comes below the hip" in doubt for doubt in found) == doubted
+
+
+def test_a_leg_too_heavy_for_its_motors_is_doubted_with_the_torque_that_standing_takes(tmp_path):
+    (doubt,) = doubts(written(tmp_path / "leg.toml", {"base.mass": (20.0, "kg")}))
+    lever = load_robot("legv2").thigh.length * math.sin(0.7)  # about half of the knee's bend
+    needed = float(doubt.partition("takes ")[2].split()[0])
+    assert needed == pytest.approx(20.9 * 9.81 * lever, rel=0.1)
+    assert "its torque limit is 20 N m" in doubt
 
 
 def test_a_weight_beyond_a_links_end_needs_a_word(tmp_path):

@@ -43,7 +43,7 @@ VERBS = {
 """Every verb with its line in the overview."""
 
 DEMO = ("universal", "energy-shaping")
-"""What `hop view` shows as `hop demo`: the policy for any leg, and the classical controller."""
+"""What `hop demo`, `hop view` and the live page show first: learned beside classical control."""
 
 COMMAND = ContextVar("COMMAND", default="hop")
 """The command that runs, as the shell reads it, for what is stored."""
@@ -113,8 +113,15 @@ def _dispatch(words: list[str]) -> int:
     if verb not in VERBS:
         raise UsageError(unknown_name("verb", verb, VERBS) + " Try `hop --help`.")
     COMMAND.set(shlex.join(["hop", *words]))
-    own, rest = ("view", [*DEMO, *rest]) if verb == "demo" else (verb, rest)
-    module = importlib.import_module(f"hopping_leg.cli.{own}")
+    try:
+        module = importlib.import_module(f"hopping_leg.cli.{'view' if verb == 'demo' else verb}")
+    except (AttributeError, RuntimeError) as error:  # where MuJoCo imports OpenGL
+        if "mujoco" in sys.modules or (drawing := os.environ.get("MUJOCO_GL")) is None:
+            raise
+        sentence = (
+            f"MuJoCo finds no library for MUJOCO_GL={drawing} ({error}); unset or install it."
+        )
+        raise UsageError(sentence) from error
     kind = get_type_hints(module.run, include_extras=True)["args"]
     module.run(read_options(kind, f"hop {verb}", inspect.getdoc(module), rest))
     return 0

@@ -51,7 +51,7 @@ class Deploy:
     live: bool = False
     """Change the height while the leg hops: + and -, or the arrows."""
     soft_limits: bool = True
-    """The paper's PD that pulls joints back into bounds."""
+    """Pull back joints that pass their soft limits; --no-soft-limits: let them pass."""
     other_robot: bool = False
     """Let a policy run that was trained on another robot, at your own risk."""
     yes: bool = False

@@ -50,15 +50,15 @@ class Emulate:
     link: Path | None = None
     """Also offer the terminal under this path, which stays the same when it is plugged again."""
     configured: bool = True
-    """Drives configured as the robot's file asks; else as their firmware is delivered."""
+    """Drives configured for the robot's file; --no-configured: as delivered."""
     homed: bool = True
-    """Drives homed by hand; else they know their position within a turn of the rotor only."""
+    """Drives homed by hand; --no-homed: they know their position within a rotor's turn."""
     held: bool = True
-    """Somebody holds the leg until both drives are powered."""
+    """Hold the leg until both drives are powered; --no-held: let it fall."""
     seed: int = 0
     """Seed of sensor noise and jitter."""
     realtime: bool = True
-    """Take real-time priority where that is permitted, so that the drives answer in time."""
+    """Take real-time priority where permitted, to answer in time; --no-realtime: do not."""
     seconds: float | None = None
     """Time after which the emulator ends; default: with Ctrl-C."""
     kinds: bool = False
@@ -116,11 +116,9 @@ class _Events:
         for name, old, drive in zip(JOINTS, before, self._robot.drives, strict=True):
             mode = drive.machine.mode
             if mode is not old:
-                why = _why(drive.machine.fault) if mode is DriveMode.FAULT else ""
-                text = mode.name.lower().replace("_", " ")
-                print(f"{self._robot.time:7.3f} s  {name}: {text}{why}", flush=True)
-
-
-def _why(code: int) -> str:
-    known = [kind(code) for kind in (FaultCode, Notice) if code in set(kind)]
-    return f" {code}: {known[0].name.lower().replace('_', ' ') if known else 'unknown'}"
+                code, text = drive.machine.fault, mode.name
+                if mode is DriveMode.FAULT:
+                    known = [kind(code).name for kind in (FaultCode, Notice) if code in set(kind)]
+                    text = f"{text} {code}: {known[0] if known else 'unknown'}"
+                text = text.lower().replace("_", " ")
+                print(f"{self._robot.time:7.3f} s  {name}: {text}", flush=True)

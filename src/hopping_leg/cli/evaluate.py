@@ -9,7 +9,6 @@ fail: every axis (payload, friction, delay, noise, pushes, ...) is changed alone
 then all at once.
 
 Examples:
-  hop evaluate fast energy-shaping
   hop evaluate fast energy-shaping --out runs/first
   hop evaluate runs/*/policy.onnx --commands 0.25 0.30 --json result.json
   hop evaluate energy-shaping --robot my_leg.toml --seeds 20 --floor stiff
@@ -54,9 +53,9 @@ class Evaluate:
     """Seed of noise and delay; choose one that selected no policy."""
     json: options.JsonFile = None
     noise: bool = True
-    """The paper's sensor noise, torque noise and delay."""
+    """With the paper's sensor noise, torque noise and delay; --no-noise: without."""
     soft_limits: bool = True
-    """Pull joints back that pass their soft limits, on the samples that the controller has."""
+    """Pull back joints that pass their soft limits; --no-soft-limits: let them pass."""
     timestep: float = TIMESTEP
     """Physics step, s."""
     rate: float = CONTROL_RATE
@@ -72,8 +71,8 @@ class Evaluate:
     traces: Path | None = None
     """Another folder for the runs as Parquet, for `hop report` and your own tools."""
     floor: Literal["soft", "stiff", "both"] = "both"
-    """The robot's own contact (soft), MuJoCo's default (stiff), or all trials on the first and
-    the fixed ones on the second."""
+    """The robot's own contact (soft), MuJoCo's default (stiff), or all trials on the first and,
+    where it is another, the fixed ones on the second."""
 
 
 def load(args: Evaluate) -> "tuple[list[Entry], RolloutConfig]":
@@ -93,51 +92,55 @@ def load(args: Evaluate) -> "tuple[list[Entry], RolloutConfig]":
     return load_entries(args.controllers, robot, args.rate), setup
 
 
-def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
-    """Evaluate controllers, print the table, write what was asked for; notes come first there."""
-    entries, setup = load(args)
+def run(args: Evaluate) -> None:
+    """Evaluate controllers, print the table, write what was asked for."""
     if args.suite == "robustness":
-        _robustness(args, entries, setup)
+        _robustness(args, *load(args))
         return
-    from hopping_leg.evaluate import prediction, tables, trials
+    from hopping_leg.evaluate import prediction, tables
 
-    judged = _judge(entries, setup, args)
+    judged = judge(args)
+    tables.print_evaluation(judged.evaluation)
+    if predictions := judged.evaluation.predictions:
+        options.show_table(*prediction.shown(predictions))
+    options.say_written(*keep(args, judged))
+
+
+def keep(args: Evaluate, judged: "EvaluationRun", notes: Sequence[str] = ()) -> list[Path | None]:
+    """Write what was asked for, notes before the evaluation's own; return the files."""
+    from hopping_leg.evaluate.report import write_report
+    from hopping_leg.evaluate.trials import save_traces
+
     notes = [*notes, *judged.evaluation.notes]
     evaluation = replace(judged.evaluation, command=COMMAND.get(), notes=notes)
-    tables.print_evaluation(evaluation)
-    if predictions := evaluation.predictions:
-        options.show_table(*prediction.shown(predictions))
     numbers, report, traces = args.json, None, args.traces
     if args.out is not None:
         numbers, traces = numbers or args.out / "evaluation.json", traces or args.out / "traces"
         report = args.out / "report.html"
     options.save_json(numbers, evaluation.to_json())
     if traces:
-        trials.save_traces(judged.runs, traces)
+        save_traces(judged.runs, traces)
     if report:
-        from hopping_leg.evaluate.report import write_report
-
         io.write_atomically(report, write_report(replace(judged, evaluation=evaluation)))
-    options.say_written(numbers, report, traces)
+    return [numbers, report, traces]
 
 
-def _judge(entries: "list[Entry]", setup: "RolloutConfig", args: Evaluate) -> "EvaluationRun":
+def judge(args: Evaluate) -> "EvaluationRun":
+    """Let controllers hop as the options say."""
     from hopping_leg.evaluate import evaluate, trials
     from hopping_leg.identify.result import posterior_robots
 
+    entries, setup = load(args)
     legs = posterior_robots(args.posterior, setup.robot) if args.posterior else ()
-    floors = ("soft", "stiff")[: 1 if legs else 2] if args.floor == "both" else (args.floor,)
+    once = legs or trials.floor_robot(setup.robot, "stiff") == setup.robot
+    floors = ("soft", "stiff")[: 1 if once else 2] if args.floor == "both" else (args.floor,)
     with Progress(parts=len(entries) * len(floors)) as bar:
+        own = partial(evaluate, entries, setup, repeats=args.seeds, seed=args.seed, robots=legs)
         judged = [
-            evaluate(
-                entries,
-                setup,
+            own(
                 commands=args.commands,
-                repeats=args.seeds,
-                seed=args.seed,
                 floor=floor,
                 kinds=("fixed",) if legs or floor != floors[0] else trials.KINDS,
-                robots=legs,
                 on_progress=partial(bar.show, about=f", {floor} floor"),
             )
             for floor in floors

@@ -67,13 +67,9 @@ def run(args: Identify) -> None:
 
     effort = SearchOptions(generations=args.generations, population=args.population)
     options = IdentifyOptions(
-        parameters=args.parameters,
-        bounds=dict(_bounds(text) for text in args.bounds),
-        search=args.search,
-        effort=effort,
-        threads=args.threads,
-        ray=args.ray,
-    )
+        parameters=args.parameters, bounds=dict(_bounds(text) for text in args.bounds),
+        search=args.search, effort=effort, threads=args.threads, ray=args.ray,
+    )  # fmt: skip
     if not args.recordings:
         raise errors.UsageError("No recording was named; make one with `hop record`.")
     recordings = [recording.load_recording(path) for path in args.recordings]
@@ -91,16 +87,12 @@ def run(args: Identify) -> None:
             say(*(f"  {warning}" for warning in r.warnings))
     with Progress("preparing") as bar:
         identified = identify(
-            recordings,
-            robot,
-            validate=judges,
-            options=options,
-            seed=args.seed,
+            recordings, robot, validate=judges, options=options, seed=args.seed,
             report=lambda stage, share, cost: bar.show(stage, share, f"cost {cost:.5g}"),
-        )
+        )  # fmt: skip
     result.save_robot(identified, args.out, origin)
     warning = result.warning(identified)
-    say(*filter(None, (warning, result.at_bounds(identified))))
+    say(*filter(None, (result.verdict(identified), warning, result.at_bounds(identified))))
     show_table(result.PARAMETERS, result.shown_parameters(identified))
     show_table(result.ERRORS, result.shown_errors(identified))
     say(*identified.identifiability.statements)

@@ -76,7 +76,7 @@ class MovingBase(Common):
     bend: paper.Bend = "backward"
     """Side of the knee; the lab's fixed-base recordings bend forward."""
     adapt: bool = True
-    """Shrink amplitudes that the leg cannot follow instead of refusing them."""
+    """Shrink amplitudes that the leg cannot follow; --no-adapt: refuse them."""
 
 
 @dataclass(frozen=True)

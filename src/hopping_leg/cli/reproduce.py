@@ -2,10 +2,9 @@
 
 A twin plays the real leg. It is recorded, identified from the recordings, a policy is trained from
 scratch on what was identified and hops on the twin without tuning, beside one that was trained on
-the CAD's robot and beside energy shaping. Then the paper's trials judge it in its own simulation,
-beside the shipped policies. A run that was interrupted or killed goes on where it was when the same
-command is called again. Many twins and other ways to identify and train are a study of their own:
-`python -m studies.sim_to_real` in a checkout.
+the CAD's robot and beside energy shaping: that is said first. Then the paper's trials judge it in
+its own simulation, beside the shipped policies. A run that was killed goes on where it was when the
+same command is called again. `python -m studies.sim_to_real`, in a checkout, does it on many twins.
 
 Examples:
   hop reproduce --quick                         # does everything work here?
@@ -19,6 +18,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from hopping_leg import io
 from hopping_leg.cli import options
 from hopping_leg.errors import UsageError
@@ -31,8 +32,9 @@ if TYPE_CHECKING:
 
 COMMANDS = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)  # Apex heights at which the twin is tried, m
 
-_RECORDED = 30.0  # s on each rig
+_RECORD_SECONDS = 30.0  # on each rig
 _FIRST_SEED = 1000  # of noise on the twin; it chose nothing
+_RECORDED = Path("studies/real_hops/results/real_hops.json")  # In a checkout, its result
 _INERTIA_FACTOR = 10.0  # the paper's Table I has nine times the CAD's inertia of the shank
 
 NOTHING_MEANT = (
@@ -46,8 +48,8 @@ class Reproduce:
     """What to reproduce and where to keep it."""
 
     out: Path | None = None
-    """Folder for transfer.html, report.html, both with a JSON file beside them, traces/, and
-    recordings, robots and trainings; default: runs/reproduce or runs/quick."""
+    """Folder for report.html, evaluation.json and traces/ of the hops on the twin, the same in
+    simulation/, recordings, robots and trainings; default: runs/reproduce or runs/quick."""
     seed: int = 0
     """Seed of the trainings; the trials' seeds follow from another number."""
     quick: bool = False
@@ -58,48 +60,68 @@ def run(args: Reproduce) -> None:
     """Record, identify, train, hop on the twin, evaluate, report."""
     from hopping_leg.cli import evaluate
     from hopping_leg.controllers.registry import ENERGY_SHAPING, shipped_policies
-    from hopping_leg.evaluate import tables
-    from hopping_leg.evaluate.report import write_report
     from hopping_leg.locks import hold_folder
     from hopping_leg.sim.randomization import draw_twin
 
     folder = args.out or Path("runs") / ("quick" if args.quick else "reproduce")
-    notes = [NOTHING_MEANT] if args.quick else []
+    notes, drawn = [NOTHING_MEANT] if args.quick else [], draw_twin(0)
     options.at_least(0, seed=args.seed)
-    drawn = draw_twin(0)
     twin, believed = drawn.robot, str(drawn.tree["extends"])
     with hold_folder(folder, UsageError):
         _check_same(folder, {"seed": args.seed, "quick": args.quick})
         recordings = list(_record(twin, believed, folder))
         identified = _identify(recordings, believed, folder, quick=args.quick)
-        policies = {
+        told: dict[str, tuple[str | Path, str]] = {
             name: (_train(robot, folder / "training", args), robot)
             for name, robot in {"identified": identified, "cad": believed}.items()
         }
-        transfer = _hop(twin, believed, policies, quick=args.quick)
-    policy, _ = policies["identified"]
-    judged = transfer.evaluation
-    io.write_json(folder / "transfer.json", {**judged.to_json(), "notes": notes})
-    io.write_atomically(folder / "transfer.html", write_report(transfer))
+        told[ENERGY_SHAPING] = ENERGY_SHAPING, believed
+        transfer = _hop(twin, told, quick=args.quick)
+    policy, _ = told["identified"]
+    said = [*notes, *_outcome(transfer)]
+    evaluate.keep(evaluate.Evaluate((), out=folder), transfer, said)
     others = ("fast",) if args.quick else shipped_policies()
-    evaluate.run(
-        evaluate.Evaluate(
-            (f"identified={policy}", *others, ENERGY_SHAPING),
-            robot=identified,
-            seeds=1 if args.quick else 5,
-            out=folder,
-            floor="soft" if args.quick else "both",
-        ),
-        notes,
-    )
-    options.say(f"On {twin.name}:")
-    tables.print_evaluation(judged)
+    options.say(*said)
+    asked = evaluate.Evaluate(
+        (f"identified={policy}", *others, ENERGY_SHAPING), robot=identified,
+        seeds=1 if args.quick else 5, out=folder / "simulation",
+        floor="soft" if args.quick else "both",
+    )  # fmt: skip
+    evaluate.keep(asked, evaluate.judge(asked), notes)
     options.say(
-        *notes,
-        f"Reports: {folder / 'transfer.html'} and {folder / 'report.html'}",
-        f"Identified robot: {identified}",
-        f"Policy: {policy} (its model card lies beside it)",
+        f"Reports: {folder / 'report.html'}, {folder / 'simulation' / 'report.html'}",
+        f"Identified robot, and its policy: {identified}, {policy}",
     )
+
+
+def _outcome(transfer: "EvaluationRun") -> list[str]:
+    """Say what hops on the twin, which errs least, and how recorded hops come out in simulation."""
+    from hopping_leg.evaluate import metrics, statistics
+
+    found = []
+    for name in transfer.evaluation.controllers:
+        traces = [run.trace for run in transfer.runs if run.controller == name]
+        windows = [window for trace in traces for window in metrics.measure(trace)]
+        errors = [1e3 * abs(error) for error in metrics.errors_of(windows)]
+        low, high = statistics.median_interval(errors, _FIRST_SEED)
+        heights = len({window.command for window in windows if len(window.apex)})
+        found.append((float(np.median(np.concatenate(errors))), low, high, name, heights))
+    best, second, *_ = found = sorted(found)
+    wins = f"{best[3]} wins" if best[2] < second[1] else "None wins clearly"
+    hops = ", ".join(f"{name} {heights}" for *_, name, heights in found)
+    listed = ", ".join(f"{name} {x:.1f} [{low:.1f}, {high:.1f}]" for x, low, high, name, _ in found)
+    said = [
+        f"On the twin hop, of {len(COMMANDS)} heights: {hops}.",
+        f"{wins}: median |apex - command| and its 95 % interval, mm: {listed}.",
+    ]
+    if _RECORDED.exists():
+        rows = io.parse_json(_RECORDED.read_bytes(), str(_RECORDED))["rows"]
+        rms = {r["robot"]: 1e3 * r["apex_rms_m"] for r in rows if r["drive"].startswith("torques")}
+        said.append(  # of the two booms' rows the later, at 200 Hz
+            f"Hops of the real leg on a boom: {rms['legv2-identified']:.0f} mm rms off in its"
+            f" identified simulation, {rms['legv2']:.0f} in the CAD's (studies/real_hops)."
+        )
+    return said
 
 
 def _check_same(folder: Path, asked: dict[str, object]) -> None:
@@ -116,8 +138,8 @@ def _record(twin: Robot, believed: str, folder: Path) -> "Iterator[Recording]":
     from hopping_leg.identify.recording import load_recording
 
     templates = (
-        ("fixed-base", paper_excitation.fixed_base(swings=(10.0,), duration=_RECORDED)),
-        ("rail", paper_excitation.moving_base(duration=_RECORDED)),
+        ("fixed-base", paper_excitation.fixed_base(swings=(10.0,), duration=_RECORD_SECONDS)),
+        ("rail", paper_excitation.moving_base(duration=_RECORD_SECONDS)),
     )
     robot = load_robot(believed)
     for seed, (rig, template) in enumerate(templates):
@@ -146,11 +168,9 @@ def _identify(recordings: "list[Recording]", believed: str, folder: Path, *, qui
     asked = IdentifyOptions(bounds=bounds, effort=effort)
     with Progress("preparing") as bar:
         found = identify(
-            recordings,
-            start,
-            options=asked,
+            recordings, start, options=asked,
             report=lambda stage, share, cost: bar.show(stage, share, f"cost {cost:.5g}"),
-        )
+        )  # fmt: skip
     save_robot(found, file, believed)
     return str(file)
 
@@ -166,29 +186,21 @@ def _train(source: str, folder: Path, args: Reproduce) -> Path:
     return policy
 
 
-def _hop(
-    twin: Robot, believed: str, policies: dict[str, tuple[Path, str]], *, quick: bool
-) -> "EvaluationRun":
-    """Let policies, told the robots of their trainings, and energy shaping hop on the twin."""
+def _hop(twin: Robot, told: dict[str, tuple[str | Path, str]], *, quick: bool) -> "EvaluationRun":
+    """Let controllers, each told another robot, hop on the twin."""
     from hopping_leg.controllers import RolloutConfig
-    from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller
+    from hopping_leg.controllers.registry import load_controller
     from hopping_leg.evaluate import runner
     from hopping_leg.evaluate.runner import Entry
     from hopping_leg.sim import NO_NOISE
 
-    told: dict[str, tuple[str | Path, str]] = {**policies}
-    told[ENERGY_SHAPING] = ENERGY_SHAPING, believed
     entries = [
         Entry(name, load_controller(what, load_robot(robot)))
         for name, (what, robot) in told.items()
     ]
     with Progress(parts=len(entries)) as bar:
         return runner.evaluate(
-            entries,
-            RolloutConfig(twin, NO_NOISE),  # a twin brings its own
-            commands=COMMANDS,
-            repeats=1 if quick else 3,
-            seed=_FIRST_SEED,
-            kinds=("fixed",),
+            entries, RolloutConfig(twin, NO_NOISE),  # a twin brings its own
+            commands=COMMANDS, repeats=1 if quick else 3, seed=_FIRST_SEED, kinds=("fixed",),
             on_progress=partial(bar.show, about=f", {twin.name}"),
-        )
+        )  # fmt: skip

@@ -138,7 +138,7 @@ def _import(args: Import) -> None:
         if (why := entry["source"]).startswith("assumed: "):
             say(f"Assumed: {path} = {entry['value']:g} {entry['unit']} ({why[9:]})")
     say(f"Wrote {out}: {robot.name} ({_summary(robot)}).")
-    say(*(f"But {doubt}" for doubt in robot_files.doubts(out)))
+    say(*(f"But {doubt}" for doubt in [*leg.doubts, *robot_files.doubts(out)]))
 
 
 def _summary(robot: Robot) -> str:

@@ -83,16 +83,10 @@ def run(args: Options) -> None:
     out = args.out or Path("runs") / f"{recipe.name}-seed{args.seed}"
     try:
         trained = train(
-            recipe,
-            load_robot(args.robot or recipe.robot),
-            args.seed,
-            out,
-            resume=args.resume,
-            minutes=args.minutes,
-            threads=args.threads,
-            ray=args.ray,
+            recipe, load_robot(args.robot or recipe.robot), args.seed, out,
+            resume=args.resume, minutes=args.minutes, threads=args.threads, ray=args.ray,
             command=COMMAND.get(),
-        )
+        )  # fmt: skip
     except (KeyboardInterrupt, OSError, TraceError):
         print(f"Stopped; the same command with --resume goes on in {out}.", file=sys.stderr)
         raise

@@ -4,10 +4,9 @@ Without further words a live simulation: change height, controller, robot, paylo
 delay while it hops, push it, pause, step, go slow; a second controller hops beside the first. With
 --trace it replays traces, simulated or from hardware; with --box it shows the real leg while
 `hop deploy` runs. It needs no screen on this computer: on another one, open the printed address
-through `ssh -L 8080:localhost:8080`. `hop demo` shows the best policy beside energy shaping.
+through `ssh -L 8080:localhost:8080`. `hop demo` is the same verb.
 
 Examples:
-  hop demo
   hop view
   hop view fast energy-shaping --height 0.32
   hop view runs/mine/policy.onnx --robot examples/my_leg.toml
@@ -24,6 +23,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from hopping_leg.cli import DEMO
 from hopping_leg.cli.options import say
 from hopping_leg.errors import UsageError
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 class View:
     """What is shown, and where the page is."""
 
-    controllers: Annotated[tuple[str, ...], tyro.conf.Positional] = ("fast",)
+    controllers: Annotated[tuple[str, ...], tyro.conf.Positional] = DEMO
     """One controller, or two side by side: shipped names, .onnx files or gain files."""
     robot: str | None = None
     """A shipped robot or a .toml file; default: the one that the first policy was trained on, or
@@ -51,7 +51,7 @@ class View:
     port: int = 8080
     """Port of this computer alone; if it is in use, the next free one."""
     browser: bool = True
-    """Whether to open the page where there is a screen."""
+    """Open the page where there is a screen; --no-browser: only print its address."""
     seconds: float = float("inf")
     """Time after which the viewer stops, s."""
 

@@ -3,7 +3,7 @@
 ``docs/other-tools.md`` says which topic holds what. Times are those of the trace, from the start
 of the run, as header's stamp and as time of the log. Of a bag, an MCAP file or rosbag2's folders
 and files in SQLite (.db3), columns are called after topic, joint and quantity, as in
-``joint_states/hip.position``, numbers of ``std_msgs/Float64`` after their topic.
+``joint_states/hip.position``, a ``std_msgs/Float64`` after its topic, an array's as ``topic[0]``.
 """
 
 import io
@@ -21,7 +21,7 @@ from hopping_leg.io import Tree
 from hopping_leg.trace import SCHEMA, Trace
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
-FLOAT = "std_msgs/msg/Float64"
+FLOAT, FLOATS = "std_msgs/msg/Float64", "std_msgs/msg/Float64MultiArray"
 
 STATES = "joint_states"
 COMMANDS = "joint_commands"
@@ -151,12 +151,15 @@ def _messages(path: Path) -> tuple[Rows, Rows]:
     states: Rows = {}
     numbers: Rows = {}
     with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
-        wanted = [c for c in bag.connections if c.msgtype in (JOINT_STATE, FLOAT)]
+        wanted = [c for c in bag.connections if c.msgtype in (JOINT_STATE, FLOAT, FLOATS)]
         for connection, time, raw in bag.messages(wanted) if wanted else ():
             name = connection.topic.strip("/")
             message: Any = bag.deserialize(raw, connection.msgtype)
-            if connection.msgtype == FLOAT:
-                numbers.setdefault(name, []).append({_LOGGED: time, name: message.data})
+            if connection.msgtype != JOINT_STATE:
+                values = {name: message.data}
+                if connection.msgtype == FLOATS:
+                    values = {f"{name}[{i}]": float(value) for i, value in enumerate(message.data)}
+                numbers.setdefault(name, []).append({_LOGGED: time, **values})
                 continue
             stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
             row = {_LOGGED: time, _STAMP: stamp or time}

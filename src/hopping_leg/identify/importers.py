@@ -92,6 +92,9 @@ def read_log(table: pl.DataFrame, path: Path) -> tuple[pl.DataFrame, RecordingMe
             f"{path} is of {design} by its name, but '{rig.metadata.robot}' is another robot;"
             " write its own robot file, and a sidecar that names it."
         )
+    own = set(rig.columns.values())  # some logs call commands desired
+    desired = {f"{c[:-4]}_des": c for c in own - set(table.columns) if c.endswith("_cmd")}
+    table = table.rename(desired, strict=False)
     table = cast(table, {c: pl.String if c == "phase" else pl.Float64 for c in table.columns}, path)
     metadata = rig.metadata
     if rig.own_rate:

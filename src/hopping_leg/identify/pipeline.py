@@ -14,7 +14,7 @@ from hopping_leg.identify.optimizers import Pass, Report, SearchOptions, jacobia
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import FitPlan, check_recordings, make_plan
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.recording_format import PAIRS
+from hopping_leg.identify.recording_format import PAIRS, Pair
 from hopping_leg.identify.result import Identified
 from hopping_leg.identify.simulate import cut
 from hopping_leg.robot import Robot, check_physics
@@ -98,7 +98,8 @@ _MISTAKES = {
         ((1, 1), (1, 1), turns) for n in (-1, 1, 2) for turns in ((n, 0), (0, n))
     ],
 }
-"""Signs of angles and torques, and quarter turns of angles, hip and knee, that undo a mistake."""
+"""Factors of angles and torques, and quarter turns of angles, hip and knee, that undo a mistake."""
+_TURN = 2 * np.pi
 _SOON = 0.2  # s, over which the robot to start from predicts well enough to tell
 _BETTER, _TOLD = 1.8, 0.5
 """Times that others must explain more, and what they may leave unexplained of both joints."""
@@ -111,6 +112,9 @@ def _check_conventions(recording: Recording, start: LegHypothesis) -> None:
         return
     given = _unexplained(driven, start, *_RIGHT)
     left = {m: min(_unexplained(driven, start, *c) for c in cs) for m, cs in _MISTAKES.items()}
+    turns, idle = (_unexplained(driven, start, (_TURN, _TURN), (k, k), (0, 0)) for k in (1, 0))
+    if idle > _BETTER * turns:  # else fast motion goes on by itself, whatever the torques
+        left["the unit of angles, velocities and gains (revolutions for radians?)"] = turns
     likely = min(left, key=lambda mistake: left[mistake])
     if left[likely] < _TOLD and given > _BETTER * left[likely]:
         raise RecordingError(
@@ -120,15 +124,9 @@ def _check_conventions(recording: Recording, start: LegHypothesis) -> None:
         )
 
 
-def _unexplained(
-    driven: Recording,
-    start: LegHypothesis,
-    angles: tuple[int, int],
-    torques: tuple[int, int],
-    turns: tuple[int, int],
-) -> float:
+def _unexplained(driven: Recording, start: LegHypothesis, *convention: Pair) -> float:
     """Return the share of the motion that its torques do not predict, infinite if unknown."""
-    changes = []
+    (angles, torques, turns), changes = convention, []
     for joint in range(2):
         for name in ("position", "velocity", "position_estimate", "velocity_estimate"):
             shift = turns[joint] * np.pi / 2 if name.startswith("position") else 0.0

@@ -101,7 +101,9 @@ def make_plan(
     search = search or "least-squares"
     if search not in SEARCHES:
         raise UsageError(unknown_name("search", search, SEARCHES))
-    gains, rigs = _open_gains(recordings), [r.metadata.rig for r in recordings]
+    found = [gain for gain in _GAINS if any(_is_open(r, gain) for r in recordings)]
+    gains = [f"drive.{joint}.{gain}" for gain in found for joint in JOINTS]
+    rigs = [r.metadata.rig for r in recordings]
     paper = search == "two-pass"
     if paper:  # Table I, and what is asked for besides
         first, second = pass_names(rigs)
@@ -166,11 +168,6 @@ def _names(recordings: Sequence[Recording], gains: list[str]) -> list[str]:
     if all(measured):
         names += [f"{joint}.torque_gain" for joint in JOINTS]
     return [*names, *_limits(recordings), *gains]
-
-
-def _open_gains(recordings: Sequence[Recording]) -> list[str]:
-    found = [gain for gain in _GAINS if any(_is_open(r, gain) for r in recordings)]
-    return [f"drive.{joint}.{gain}" for gain in found for joint in JOINTS]
 
 
 def _is_open(recording: Recording, gain: str) -> bool:

@@ -6,6 +6,7 @@ need a sidecar, or come from one of the known rigs.
 
 import gzip
 import hashlib
+import re
 import zlib
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
@@ -173,9 +174,15 @@ def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
     try:
         if content.startswith(_GZIP):
             content = gzip.decompress(content)
-        lines = [n for n in content.splitlines() if n.strip() and n[:1] != b"#"]
+        unquoted = re.sub(rb'"[^"\n]*"', b"", content.removeprefix(b"\xef\xbb\xbf"))
+        lines = [n for n in unquoted.splitlines() if n.strip() and n[:1] != b"#"]
         mark = next((m for m in b"\t;" if m in b"".join(lines[:1])), ord(","))
         fields = [n.count(mark) for n in lines]
+        if fields[1:] and fields[0] not in fields[1:]:
+            raise RecordingError(
+                f"{origin}: its rows have {fields[1] + 1} fields, all others than the"
+                f" {fields[0] + 1} names of its header; name every field, and nothing else, there."
+            )
         if short := [row for row, count in enumerate(fields, -1) if count < fields[0]]:
             raise RecordingError(
                 f"{origin}: row {short[0]} has fewer fields than the {fields[0] + 1} of the"
@@ -189,10 +196,13 @@ def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
         ) from error
     names = pl.Series(texts.columns)
     if names.str.contains("_duplicated_").any() or names.cast(float, strict=False).count():
-        raise RecordingError(f"{origin} has no header, or equal names; name each of its columns.")
+        raise RecordingError(
+            f"{origin} has no header, or equal names; name each of its columns, without a #."
+        )
     texts = texts.rename(str.strip).select(pl.all().str.strip_chars().replace("", None))
     flags = pl.all().str.to_lowercase().replace({"true": "1", "false": "0"})
-    numbers = texts.select(flags.cast(pl.Float64, strict=False))
+    plain = flags.str.replace(",", "." if mark != ord(",") else ",", literal=True)
+    numbers = texts.select(plain.cast(pl.Float64, strict=False))
     pairs = zip(numbers, texts, strict=True)
     return pl.DataFrame([n if n.null_count() == t.null_count() else t for n, t in pairs])
 

@@ -81,9 +81,9 @@ def check_table(inspection: Inspection) -> None:
     _check_sizes(inspection)
     _check_motion(inspection)
     _check_jumps(inspection)
-    for joint in range(2):
-        _check_velocity(inspection, PAIRS["position"][joint], PAIRS["velocity"][joint])
-    for joint in range(2):
+    _check_signs(inspection)
+    for joint, columns in enumerate(zip(PAIRS["position"], PAIRS["velocity"], strict=True)):
+        _check_velocity(inspection, *columns)
         _check_torque(inspection, joint)
     _warn_of_stalls(inspection)
 
@@ -304,6 +304,20 @@ def _check_jumps(inspection: Inspection) -> None:
                 f" {inspection.row(beyond[0])}, but the {name} of '{robot.name}' ends at"
                 f" {joint.stop_lower:g} and {joint.stop_upper:g}; check sign, zero and robot"
             )
+
+
+def _check_signs(inspection: Inspection) -> None:
+    """Refuse a standing leg one of whose joints has another sign; a mirrored leg is as good."""
+    robot, columns = inspection.robot, PAIRS["position"]
+    if robot is None or inspection.metadata.rig == "fixed-base":
+        return
+    about = [float(np.nanmedian([*inspection.floats(c), np.nan])) for c in columns]
+    if np.prod(np.sign([*about, *(j.lower + j.upper for j in (robot.hip, robot.knee))])) < 0:
+        inspection.refuse(
+            f"columns {' and '.join(columns)} are about {about[0]:.3g} and {about[1]:.3g} rad,"
+            f" which no standing '{robot.name}' has: change the sign of one of the joints, of its"
+            " velocity, torque and commands, too"
+        )
 
 
 _COMMON_PEAK = 60.0  # peak torque where the robot is unknown, N m

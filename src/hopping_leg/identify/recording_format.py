@@ -68,7 +68,7 @@ def cast(
         except pl.exceptions.PolarsError as error:
             said = str(error).partition("\n")[0]
             raise RecordingError(
-                f"{origin}: column '{name}' must hold {kinds[name]}: {said}."
+                f"{origin}: column '{name}' must hold {kinds[name]}: {said}; delete a row of units."
             ) from error
     return pl.DataFrame(series)
 

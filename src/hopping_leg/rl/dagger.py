@@ -18,7 +18,7 @@ import numpy as np
 import torch
 from torch.nn import functional
 
-from hopping_leg.arrays import Array, Array32, BoolArray
+from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.controllers import robot_numbers
 from hopping_leg.controllers.mpc import HopShape, Planning, TrueStateMpc
 from hopping_leg.envs.hidden_state import HiddenState
@@ -162,7 +162,8 @@ class Dagger(Learner):
 
     def _step(self) -> tuple[Any, ...]:
         seen, label, begun = self._seen, self._label, self._begun
-        weight = self._weigh()
+        pushing = np.where(self.teacher.pushing, self.config.push_weight, 1.0)
+        weight = np.where(self.teacher.folding, self.config.fold_weight, pushing)
         hidden = self._hidden.view() if self._hidden else np.empty((len(begun), 0), np.float32)
         with torch.no_grad():
             fresh = torch.from_numpy(~begun)[:, None]
@@ -173,12 +174,7 @@ class Dagger(Learner):
             self._hidden.update(step.apex_error, step.terminated | step.truncated)
         self._seen, self._begun = step.observation, step.terminated | step.truncated
         self._label = self._teach()
-        return seen, label, weight, hidden, begun
-
-    def _weigh(self) -> Array32:
-        config, teacher = self.config, self.teacher
-        weight = np.where(teacher.pushing, config.push_weight, 1.0)
-        return np.where(teacher.folding, config.fold_weight, weight).astype(np.float32)
+        return seen, label, weight.astype(np.float32), hidden, begun
 
     def _act(self, action: Array) -> Step:
         """Act for a control period, in which some legs are held and some bases are pushed."""

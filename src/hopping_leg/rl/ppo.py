@@ -9,7 +9,7 @@ that is one update older, it forgets how to hop as the noise falls.
 import copy
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -160,7 +160,9 @@ class PPO(Learner):
         for group in self.optimizer.param_groups:
             group["lr"] = self._rate * max(0.1, self._left)
         moved = []
-        for rows in self._draw_batches(len(actions)):
+        epochs, size = range(config.n_epochs), len(actions)
+        orders = (torch.randperm(size, generator=self._draws) for _ in epochs)
+        for rows in (rows for order in orders for rows in torch.split(order, config.batch_size)):
             mean = self.actor(observations[rows])
             now = -0.5 * ((actions[rows] - mean) / rollout.std).square().sum(dim=-1)
             ratio = torch.exp(now - before[rows])
@@ -184,11 +186,6 @@ class PPO(Learner):
         self.logger.record("train/approx_kl", divergence)
         self.logger.record("train/learning_rate", self._rate)
         self.seconds["gradient steps"] += time.monotonic() - began
-
-    def _draw_batches(self, size: int) -> Iterator[torch.Tensor]:
-        for _ in range(self.config.n_epochs):
-            order, batch = torch.randperm(size, generator=self._draws), self.config.batch_size
-            yield from (order[first : first + batch] for first in range(0, size, batch))
 
     @torch.no_grad()
     def _advantages(self, rollout: Rollout) -> tuple[torch.Tensor, torch.Tensor]:

@@ -55,9 +55,9 @@ def within_reach(recipe: Recipe, robot: Robot) -> Recipe:
             f" on {robot.name}; check masses, lengths and motors with `hop robots check`, or give"
             " other --heights."
         )
-    if len(longest) < len(heights):
-        recipe = recipe.within(longest[0].command_m, longest[-1].command_m)
-    return recipe
+    if len(longest) == len(heights):
+        return recipe
+    return recipe.within(longest[0].command_m, longest[-1].command_m)
 
 
 def _longest_run(

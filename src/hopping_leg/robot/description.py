@@ -63,11 +63,14 @@ class Description:
             """Constraints that close a loop, which are left out."""
             if root.tag == "mujoco":
                 self._refuse_heavy_meshes(spec)
+            shaped = [bool(b.explicitinertial or b.geoms) for b in spec.bodies]
             _leave_out(spec)
             with warnings.catch_warnings(action="ignore"):  # of what is deprecated
                 self.model = spec.compile()
         except (ValueError, LookupError, Xml.ParseError, mujoco.FatalError) as error:
             raise RobotError(f"{path} is no model that MuJoCo reads: {one_line(error)}.") from error
+        self.weightless = {*np.flatnonzero(shaped).tolist()} - {*self.heavy(range(len(shaped)))}
+        """Bodies of no mass for which the file has an inertia or a shape."""
         self.data = mujoco.MjData(self.model)
         mujoco.mj_kinematics(self.model, self.data)
         strength = np.linalg.norm(self.model.opt.gravity)

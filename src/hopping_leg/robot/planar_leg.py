@@ -47,6 +47,8 @@ class PlanarLeg:
     knee's, at the joint; as far as the file states them."""
     notes: list[str]
     """Lines on hip's and knee's angle by the file's coordinates, and on what is not read."""
+    doubts: list[str]
+    """Sentences on what the file hardly means."""
 
 
 def read_leg(
@@ -99,7 +101,12 @@ def read_leg(
         for key, (value, source) in entries.items()
         if value > 0 or "stop" in key
     }
-    return PlanarLeg(tree.name, numbers, notes)
+    doubts = [f"'{tree.body(i)}' weighs nothing." for i in sorted(tree.weightless & moving)]
+    far = (
+        (i, *tree.model.jnt_range[i]) for i in joints if abs(tree.model.jnt_range[i]).max() > _TURN
+    )
+    doubts += [f"'{tree.joint(i)}' ends at {a:g} and {b:g} rad: in degrees?" for i, a, b in far]
+    return PlanarLeg(tree.name, numbers, notes, [f"{tree.origin}: {doubt}" for doubt in doubts])
 
 
 def _named(tree: Description, option: str, kind: str, name: str, valid: Iterable[str]) -> str:

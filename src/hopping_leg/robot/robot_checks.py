@@ -9,7 +9,7 @@ import numpy as np
 from hopping_leg.errors import RobotError
 from hopping_leg.io import Tree
 from hopping_leg.robot.hardware import torque_constant
-from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.robot.model import GRAVITY, TIMESTEP
 from hopping_leg.robot.parameters import JOINTS, Robot
 
 Bounds = tuple[str, float, float, str]
@@ -22,6 +22,7 @@ _DRIVES: tuple[Bounds, ...] = (
 )
 """Bounds that no robot file can move: beyond them a limit guards nothing."""
 _ROUNDING = 1.001
+_STANDING = 0.5  # share of the knee's torque limit that standing may take of a leg that hops
 
 _AT_OUTPUT = ("torque_limit", "peak_torque", "rated_torque", "no_load_speed")
 _DEPENDENTS: dict[str, list[str]] = {}
@@ -69,18 +70,15 @@ def find_doubts(robot: Robot, origin: str, own: Tree, parent: str, inherited: Tr
         " is not stated is what rotor and gear give)."
         for cause in dict.fromkeys(unfit.values())
     ]
-    found += [
-        f"{origin}: '{path}' is {value:.5g}, which hardly fits the other numbers ({low:.3g} to"
-        f" {high:.3g}); check their units and decimal points."
-        for path, low, high in _usual(robot)
-        if not low <= (value := attrgetter(path)(robot)) <= high
-    ]
-    if robot.kind == "leg" and not _stands(robot):
-        found.append(
-            f"{origin}: within 'hip.lower' to 'knee.upper' the foot never comes below the hip; is a"
-            " joint's sign wrong, or does the knee bend forward?"
-        )
-    return found
+    unusual: dict[str, str] = {}  # by part: one number that is wrong makes others look so
+    for path, low, high in _usual(robot):
+        if not low <= (value := attrgetter(path)(robot)) <= high:
+            said = f"{origin}: '{path}' is {value:.5g}, which hardly fits the other numbers"
+            said += f" ({low:.3g} to {high:.3g}); check their units and decimal points."
+            unusual.setdefault(path.partition(".")[0], said)
+    if robot.kind == "leg" and not unusual:
+        found += (f"{origin}: {doubt}" for doubt in _doubtful_stance(robot))
+    return [*unusual.values(), *found]
 
 
 def _usual(robot: Robot) -> Iterator[tuple[str, float, float]]:
@@ -92,18 +90,30 @@ def _usual(robot: Robot) -> Iterator[tuple[str, float, float]]:
         yield f"{ball}.radius", 0, size
     for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
         whole = link.mass * link.reach**2
+        yield f"{name}.length", 0.01, 3.0
+        yield f"{name}.mass", 0, 10 * (robot.mass - link.mass)
         yield f"{name}.inertia", 0.002 * whole, whole
     for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
+        most, gear = robot.mass * size**2, (joint.motor.gear_ratio * joint.belt_ratio) ** 2
         yield f"{name}.friction", 0, joint.torque_limit
-        yield f"{name}.armature", 0, robot.mass * size**2
+        yield f"{name}.motor.rotor_inertia", 0, most / gear
+        yield f"{name}.armature", 0, most
 
 
-def _stands(robot: Robot) -> bool:
-    """Tell whether some posture within the soft limits has the foot straight below the hip."""
-    knee = np.linspace(robot.knee.lower, robot.knee.upper, 50)
+def _doubtful_stance(robot: Robot) -> Iterator[str]:
+    """Yield what is odd of the postures within the soft limits with the foot below the hip."""
+    knee = np.linspace(robot.knee.lower, robot.knee.upper, 51)
     thigh, shank = robot.thigh.length, robot.shank.length
     hip = np.arctan2(-shank * np.sin(knee), thigh + shank * np.cos(knee))
-    return bool(np.any((robot.hip.lower <= hip) & (hip <= robot.hip.upper)))
+    if not np.any((robot.hip.lower <= hip) & (hip <= robot.hip.upper)):
+        never = "within 'hip.lower' to 'knee.upper' the foot never comes below the hip; "
+        yield never + "is a joint's sign wrong, or does the knee bend forward?"
+    torque, limit = robot.mass * GRAVITY * thigh * abs(np.sin(hip[25])), robot.knee.torque_limit
+    if torque > _STANDING * limit:
+        yield (
+            f"standing with the knee at {knee[25]:.3g} rad takes {torque:.3g} N m of it, and its"
+            f" torque limit is {limit:.3g} N m: too little to hop; check masses and motor."
+        )
 
 
 def check_physics(robot: Robot, origin: str) -> None:

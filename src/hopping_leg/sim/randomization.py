@@ -124,10 +124,6 @@ def times(path: str, low: float, high: float) -> Range:
     return Range(path, "1", low, high, "[C]", "logarithmic", "factors")
 
 
-def _both(name: str, unit: str, low: float, high: float) -> tuple[Range, ...]:
-    return tuple(Range(f"{joint}.{name}", unit, low, high, "[C]") for joint in JOINTS)
-
-
 WIDE_RANGES = (
     times("base.mass", 0.7, 1.6),
     *(times(f"{link}.{n}", 0.6, 2.0) for link in ("thigh", "shank") for n in ("mass", "inertia")),
@@ -137,7 +133,7 @@ WIDE_RANGES = (
     times("contact.damping_ratio", 0.4, 2.5),
     times("hip.torque_gain", 1 / 1.3, 1.3),
     times("knee.torque_gain", 1 / 1.3, 1.3),
-    *_both("friction", "N m", 0.0, 1.4),
+    *(Range(f"{joint}.friction", "N m", 0.0, 1.4, "[C]") for joint in JOINTS),
     Range("reality.latency.command", "s", 0.0, 0.0149, "[C]", bounds="additions", step=5e-3),
 )
 """What may surprise any leg: a payload, heavy links, a worn or dry rail, hard and soft ground,
