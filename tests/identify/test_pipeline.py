@@ -16,7 +16,7 @@ from hopping_leg.identify.recording_format import PAIRS
 from hopping_leg.identify.result import as_json, save_robot
 from hopping_leg.io import replace_at
 from hopping_leg.robot import check_physics, load_robot, robot_text
-from tests.identify.fitting import EFFORT, TRUTH, identified, options, run
+from tests.identify.fitting import EFFORT, RATE, TRUTH, TWIN, identified, options, run
 from tests.identify.twin import BELT, LEG, changed, hops, record, swing, tracked
 
 STEPS_APART = 5e-4
@@ -61,6 +61,17 @@ def test_a_belt_is_found_from_a_far_start_and_what_is_stated_of_it_stays(tmp_pat
     assert reality.knee == found.robot.reality.knee
     assert reality.knee.stiffness_damping == 0.03
     assert reality.latency.jitter == 0
+
+
+def test_each_rig_is_judged_for_itself():
+    stand = record(TWIN, swing(6.0, "rail", rate=RATE), "rail", rate=RATE, name="squats")
+    few = dataclasses.replace(EFFORT, generations=1)
+    found = identify([run(), stand], LEG, options=options(search="cma", effort=few))
+    assert set(found.by_rig) == {"fixed-base", "rail"}
+    errors = [v.closed_loop_position_rms_rad[0] for v in found.by_rig.values()]
+    assert min(errors) < found.validation.closed_loop_position_rms_rad[0] < max(errors)
+    assert "rail" in as_json(found)["validation_by_rig"]
+    assert identified().by_rig == {}
 
 
 @pytest.mark.parametrize("search", ["least-squares", "cma", "two-pass"])

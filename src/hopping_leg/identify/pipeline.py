@@ -83,7 +83,10 @@ def identify(
     hypothesis, known = _conclude(objective, passes[-1])
     report("judging", 1.0, passes[-1].found.cost)
     before, after = (validation.validate(held, h, threads) for h in (plan.start, hypothesis))
-    parts = (tuple(passes), known, tuple(fit), tuple(held), split, after, before, seed)
+    rigs = dict.fromkeys(r.metadata.rig for r in held)
+    groups = {rig: [r for r in held if r.metadata.rig == rig] for rig in rigs if len(rigs) > 1}
+    by_rig = {k: validation.validate(group, hypothesis, threads) for k, group in groups.items()}
+    parts = (tuple(passes), known, tuple(fit), tuple(held), split, after, before, by_rig, seed)
     return Identified(hypothesis, plan.start, plan, *parts)
 
 

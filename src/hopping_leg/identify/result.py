@@ -1,6 +1,7 @@
 """What an identification found: as JSON, and as a robot file."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
-from hopping_leg.identify import optimizers
+from hopping_leg.identify import optimizers, recording_format
 from hopping_leg.identify.identifiability import Identifiability
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import FitPlan
@@ -51,6 +52,8 @@ class Identified:
     validation: Validation
     """Errors of the result on what was held."""
     start_validation: Validation
+    by_rig: Mapping[recording_format.Rig, Validation]
+    """Errors of the result on each rig, if there are several."""
     seed: int
 
     @property
@@ -87,6 +90,7 @@ def as_json(identified: Identified, posterior: int = 0) -> dict[str, Any]:
         "robot_digest": identified.robot.digest,
         "validation": asdict(identified.validation),
         "start_validation": asdict(identified.start_validation),
+        "validation_by_rig": {rig: asdict(v) for rig, v in identified.by_rig.items()},
         "quality": quality_json(identified),
         "warning": warning(identified),
         "parameters": parameters_json(identified),
