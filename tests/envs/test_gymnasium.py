@@ -79,20 +79,6 @@ def test_everything_random_follows_the_seed(kind):
     env.close()
 
 
-def test_a_leg_knows_nothing_of_its_neighbour():
-    env = make(VECTOR)
-    actions = plan(env)
-    rows = []
-    for factor in (1, -1):
-        changed = actions * [[1], [factor]]
-        env.reset(seed=1)
-        rows.append([env.step(action)[:2] for action in changed.astype(np.float32)])
-    for (seen, reward), (other_seen, other_reward) in zip(*rows, strict=True):
-        np.testing.assert_array_equal(seen[0], other_seen[0])
-        assert reward[0] == other_reward[0]
-    assert (seen[1] != other_seen[1]).any()
-
-
 def overwrite(seen):
     """Fill every array in what an environment returned."""
     if isinstance(seen, dict):

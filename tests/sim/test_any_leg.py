@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hopping_leg.robot import check_physics, doubts, load_robot
+from hopping_leg.robot import NO_MISMATCH, check_physics, doubts, load_robot
 from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.any_leg import SIZES, draw_any_leg, draw_leg
 
@@ -17,7 +17,7 @@ def test_a_drawn_leg_is_a_robot_file_without_doubts(tmp_path):
         drawn.save(file)
         assert load_robot(file) == drawn.robot == draw_leg(seed).robot
         assert doubts(file) == []
-        assert drawn.robot.reality.neutral
+        assert drawn.robot.reality == NO_MISMATCH
         for spread in SIZES:
             part, name = spread.path.split(".")
             factor = getattr(getattr(drawn.robot, part), name) / getattr(getattr(LEG, part), name)
@@ -42,7 +42,7 @@ def test_legs_of_a_training_can_be_and_follow_from_their_seeds():
 
 def test_what_is_told_leaves_out_gains_delay_and_transmission():
     told = [leg.believed for leg in DRAWN]
-    assert all(robot.reality.neutral for robot in told)
+    assert all(robot.reality == NO_MISMATCH for robot in told)
     assert {robot.hip.torque_gain for robot in told} == {1.0}
     assert all(leg.believed.thigh.length == leg.true.thigh.length for leg in DRAWN)
     heavier = np.array([leg.true.base.mass / leg.believed.base.mass for leg in DRAWN])

@@ -11,5 +11,5 @@ from hopping_leg.envs.rewards import Reward as Reward
 from hopping_leg.envs.rewards import RewardTerm as RewardTerm
 from hopping_leg.envs.rewards import Transition as Transition
 from hopping_leg.envs.task import HoppingTask as HoppingTask
-from hopping_leg.envs.task import TaskLeg as TaskLeg
 from hopping_leg.envs.task_config import TaskConfig as TaskConfig
+from hopping_leg.sim.any_leg import TaskLeg as TaskLeg

@@ -231,22 +231,18 @@ class HoppingVectorEnv(_TaskView, gymnasium.vector.VectorEnv[Array32, Array32, A
             new = terminated | truncated
         else:
             self._ended = terminated | truncated
-        return seen, reward, terminated, truncated, self._info(step, new)
-
-    def _info(self, step: Step, new: BoolArray) -> dict[str, Any]:
-        """Return what a step tells, where ``new`` legs have just begun an episode."""
         command = np.where(new, self.task.command, step.command)
         standing = {"base_height": self.task.legs.height.copy(), "command": command}
         info = self._masked(standing, np.ones(self.num_envs, np.bool_))
         info |= self._of_tick(step, ~new)
-        if step.final_observation is None:
-            return info
-        last = np.full(self.num_envs, None, dtype=object)
-        for leg in np.flatnonzero(new):
-            last[leg] = step.final_observation[leg].copy()
-        final = self._masked({"base_height": step.height, "command": step.command}, new)
-        final |= self._of_tick(step, new)
-        return info | self._masked({"final_obs": last, "final_info": final}, new)
+        if step.final_observation is not None:
+            last = np.full(self.num_envs, None, dtype=object)
+            for leg in np.flatnonzero(new):
+                last[leg] = step.final_observation[leg].copy()
+            final = self._masked({"base_height": step.height, "command": step.command}, new)
+            final |= self._of_tick(step, new)
+            info |= self._masked({"final_obs": last, "final_info": final}, new)
+        return seen, reward, terminated, truncated, info
 
     def _of_tick(self, step: Step, legs: BoolArray) -> dict[str, Any]:
         """Return rewards' terms and apexes of some legs."""

@@ -58,7 +58,11 @@ class InitialStates:
         if kind == "standing":
             q = np.tile(self._standing, (count, 1))
             return kinematics.stance_height(leg, q), q
-        q, gap = self._drop(leg, scale, count, rng)
+        length = scale * rng.uniform(*_DROP_LENGTH, count)
+        offset = scale * rng.uniform(-_DROP_OFFSET, _DROP_OFFSET, count)
+        q = kinematics.joint_angles(leg, np.stack([length, offset], axis=-1))
+        q = np.clip(q, self._robot.of_joints("lower"), self._robot.of_joints("upper"))
+        gap = scale * rng.uniform(0.0, _DROP_CLEARANCE, count)
         if kind == "mixed":
             stands = rng.random(count) < 0.5
             q[stands], gap[stands] = self._standing, 0.0
@@ -68,12 +72,3 @@ class InitialStates:
         stands = rng.random(count) < _STANDING_SHARE
         apex = command + scale * rng.uniform(*_NEAR_APEX, count)
         return np.where(stands, standing, np.maximum(standing, apex)), q
-
-    def _drop(
-        self, leg: kinematics.Geometry, scale: Array, count: int, rng: np.random.Generator
-    ) -> tuple[Array, Array]:
-        length = scale * rng.uniform(*_DROP_LENGTH, count)
-        offset = scale * rng.uniform(-_DROP_OFFSET, _DROP_OFFSET, count)
-        q = kinematics.joint_angles(leg, np.stack([length, offset], axis=-1))
-        q = np.clip(q, self._robot.of_joints("lower"), self._robot.of_joints("upper"))
-        return q, scale * rng.uniform(0.0, _DROP_CLEARANCE, count)

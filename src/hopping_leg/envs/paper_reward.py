@@ -40,6 +40,7 @@ def paper_reward(robot: Robot, config: PaperRewardConfig = PaperRewardConfig()) 
     """Return the paper's reward for a leg; x_o is the base's height where it stands at first."""
     c, rest = config, np.array(standing_length(robot) + robot.foot.radius)
     fastest = np.square(robot.of_joints("no_load_speed")[None])
+    lower, upper = robot.of_joints("lower")[None], robot.of_joints("upper")[None]
 
     def energy_gain(t: Transition) -> Array:  # Ge, m2/s2 + m2
         gain: Array = np.square(t.rate) + np.square(t.height - rest)
@@ -52,6 +53,10 @@ def paper_reward(robot: Robot, config: PaperRewardConfig = PaperRewardConfig()) 
         barrier: Array = np.heaviside(excess, _ONE) * growth
         return barrier
 
+    def joint_position_penalty(t: Transition) -> Array:  # Pjp: 1 beyond limits, rising to it
+        near = np.exp(_SHARPNESS * (lower - t.q)) + np.exp(_SHARPNESS * (t.q - upper))
+        return sum_of_joints(np.minimum(near, _ONE))
+
     def joint_velocity_penalty(t: Transition) -> Array:  # Pjv, where a joint is faster, rad2/s2
         return sum_of_joints(np.maximum(np.square(t.qd) - fastest, _ZERO))
 
@@ -60,7 +65,7 @@ def paper_reward(robot: Robot, config: PaperRewardConfig = PaperRewardConfig()) 
             RewardTerm("energy", c.energy, energy_gain),
             RewardTerm("height", -c.height, height_barrier),
             jerk_term(c.jerk),
-            position_term(robot, c.position),
+            RewardTerm("position", -c.position, joint_position_penalty),
             RewardTerm("velocity", -c.velocity, joint_velocity_penalty),
         )
     )
@@ -69,14 +74,3 @@ def paper_reward(robot: Robot, config: PaperRewardConfig = PaperRewardConfig()) 
 def jerk_term(weight: float) -> RewardTerm:
     """Return Pj, the penalty on the squared change of the action."""
     return RewardTerm("jerk", -weight, lambda t: sum_of_joints(np.square(t.action - t.last_action)))
-
-
-def position_term(robot: Robot, weight: float) -> RewardTerm:
-    """Return Pjp, the penalty on joints: 1 beyond their limits, and rising to it inside."""
-    lower, upper = robot.of_joints("lower")[None], robot.of_joints("upper")[None]
-
-    def joint_position_penalty(t: Transition) -> Array:
-        near = np.exp(_SHARPNESS * (lower - t.q)) + np.exp(_SHARPNESS * (t.q - upper))
-        return sum_of_joints(np.minimum(near, _ONE))
-
-    return RewardTerm("position", -weight, joint_position_penalty)

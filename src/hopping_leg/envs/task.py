@@ -3,7 +3,6 @@
 import copy
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
@@ -18,26 +17,13 @@ from hopping_leg.envs.initial_states import InitialStates
 from hopping_leg.envs.observation import make_observation, sample_scaling
 from hopping_leg.robot import Robot
 from hopping_leg.sim import LegSimulator, Measurement, Plant, randomization
+from hopping_leg.sim.any_leg import TaskLeg
 from hopping_leg.sim.compiled import compiled
 
 _RECENT = 500  # Hops that count as the latest
 _PRIVILEGED = 16  # Entries of the true state, where all legs are the same
 _CLEARANCE_GAIN = 10.0  # scale of clearances in there, 1/m
 _EXCESS, _NEAR = 0.05, 0.02  # scales of what the apex in sight misses, m
-
-
-@dataclass(frozen=True)
-class TaskLeg:
-    """One leg of a task in which legs differ."""
-
-    believed: Robot
-    """What is told of it."""
-    true: Robot
-    """What it is."""
-    command_range: tuple[float, float]
-    """Desired heights that it reaches, m."""
-    disturbed: bool = True
-    """Whether it meets the task's noise and delay."""
 
 
 class Step(NamedTuple):
@@ -282,7 +268,10 @@ class HoppingTask(Stateful):
     ) -> Step:
         self._tick += 1
         if self._tick >= self._next_switch:
-            self._change_commands()
+            due = np.flatnonzero(self._switch <= self._tick)
+            self.command[due] = self._draw_commands(due)
+            self._switch[due] = self._tick + self._draw_holds(len(due))
+            self._plan()
         terminated = truncated = ended = self._never
         if self._tick >= self._next_end:
             truncated = ended = self._end <= self._tick
@@ -324,12 +313,6 @@ class HoppingTask(Stateful):
     def _plan(self) -> None:
         """Note the next tick at which an episode ends or a command changes."""
         self._next_end, self._next_switch = int(self._end.min()), int(self._switch.min())
-
-    def _change_commands(self) -> None:
-        due = np.flatnonzero(self._switch <= self._tick)
-        self.command[due] = self._draw_commands(due)
-        self._switch[due] = self._tick + self._draw_holds(len(due))
-        self._plan()
 
     def _draw_commands(self, rows: IntArray) -> Array:
         if self.task_legs or self.options.command_range is not None:

@@ -8,14 +8,13 @@ look again.
 
 import itertools
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from hopping_leg import io
 from hopping_leg.controllers.mpc import HopShape, Planning, TrueStateMpc
-from hopping_leg.envs.task import TaskLeg
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.dagger import DaggerConfig
 from hopping_leg.rl.onnx_export import every_centimetre
@@ -23,7 +22,7 @@ from hopping_leg.rl.policy_evaluation import CommandResult, evaluate_policy
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot import Robot
 from hopping_leg.sim import NO_NOISE, compile_physics
-from hopping_leg.sim.any_leg import draw_any_leg
+from hopping_leg.sim.any_leg import TaskLeg, draw_any_leg
 from hopping_leg.workers import ProcessWorkers, RayWorkers
 
 _REACHED = 0.005  # median error with which the teacher reaches a height on the robot, m
@@ -159,5 +158,7 @@ def find_legs(
             rows = [asdict(reach) for reach in found]
             io.write_json(file, {"asked": asked, "tried": tried, "legs": rows})
             on_progress(min(len(found) / count, 1.0))
-    drawn = ((draw_any_leg(reach.leg), (reach.low, reach.high)) for reach in found[:count])
-    return [TaskLeg(leg.believed, leg.true, span, leg.disturbed) for leg, span in drawn]
+    return [
+        replace(draw_any_leg(reach.leg), command_range=(reach.low, reach.high))
+        for reach in found[:count]
+    ]

@@ -146,24 +146,29 @@ def _base() -> Robot:
 
 
 @dataclass(frozen=True)
-class AnyLeg:
-    """A leg of a training.
-
-    Attributes:
-        believed: What is told of it.
-        true: What it is.
-        disturbed: Whether it meets the paper's noise and delay.
-    """
+class TaskLeg:
+    """One leg of a task in which legs differ."""
 
     believed: Robot
+    """What is told of it."""
     true: Robot
-    disturbed: bool
+    """What it is."""
+    command_range: tuple[float, float] = (math.nan, math.nan)
+    """Desired heights that it reaches, m."""
+    disturbed: bool = True
+    """Whether it meets the task's noise and delay."""
 
 
 def draw_leg(seed: int) -> Twin:
     """Draw a leg of any size whose file tells all of it; the same seed gives the same leg."""
     rng, base = np.random.default_rng([seed, 0]), _base()
-    robot = _within_drives(_draw(_scale(base, rng), (*GROUND, *FRICTION), rng))
+    robot = _draw(_scale(base, rng), (*GROUND, *FRICTION), rng)
+    for name in JOINTS:  # motors are no stronger than the currents of their drives make them
+        motor, servo = getattr(robot, name).motor, getattr(robot.hardware, name)
+        most = servo.torque_constant * servo.max_current * motor.gear_ratio
+        share = min(most / motor.peak_torque, 1.0)
+        for torque in _TORQUES:
+            robot = replace_at(robot, f"{name}.motor.{torque}", share * getattr(motor, torque))
     tree: Tree = {"name": f"leg-{seed}", "description": f"leg {seed}, drawn"}
     armatures = {f"{joint}.armature": {"value": 0.0, "unit": "kg m2"} for joint in JOINTS}
     for path, entry in (*numbers(load_tree(BASE)), *armatures.items()):
@@ -175,8 +180,8 @@ def draw_leg(seed: int) -> Twin:
     return Twin(robot_from_tree(tree, f"leg {seed}"), tree)
 
 
-def draw_any_leg(seed: int) -> AnyLeg:
-    """Draw a leg of a training; the same seed gives the same leg."""
+def draw_any_leg(seed: int) -> TaskLeg:
+    """Draw a leg of a training, heights left open; the same seed gives the same leg."""
     rng = np.random.default_rng([seed, 1])
     shipped = load_robot(_SHIPPED[rng.integers(len(_SHIPPED))])
     design = _scale(_base(), rng) if rng.random() < _SCALED else shipped
@@ -192,19 +197,25 @@ def draw_any_leg(seed: int) -> AnyLeg:
     believed = replace(told, reality=_base().reality)
     if rng.random() >= _EXACT:
         true = _draw(true, GAINS, rng)
-    true = _late(true, rng)
+    share = rng.random()
+    latest = _PERIOD if share < _PUNCTUAL + _SOON else _LATEST
+    seconds = 0.0 if share < _PUNCTUAL else float(rng.uniform(0.0, latest))
+    true = replace_at(true, "reality.latency.command", seconds)
     heavy = min(true.hip.armature, true.knee.armature) > _LEAST_ARMATURE * _unit(
         "kg m2", *_ratios(true)
     )
     if rng.random() < _ELASTIC and heavy:
-        true = _soft_enough(_draw(true, TRANSMISSIONS, rng))
+        true = _draw(true, TRANSMISSIONS, rng)
+        for name in JOINTS:  # no stiffer than a training can simulate
+            path, most = f"reality.{name}.stiffness", 0.5 * stiffest(true, name, _STEP)
+            true = replace_at(true, path, min(attrgetter(path)(true), most))
         if rng.random() < _WORN:
             true = _draw(true, WORN, rng)
     if rng.random() < _EMPTY:
         true = _draw(true, EMPTY, rng)
     if rng.random() < _NOISY:
         true = _draw(true, NOISES, rng)
-    return AnyLeg(believed, true, bool(rng.random() < _DISTURBED))
+    return TaskLeg(believed, true, disturbed=bool(rng.random() < _DISTURBED))
 
 
 def _scale(base: Robot, rng: np.random.Generator) -> Robot:
@@ -236,18 +247,6 @@ def _scale(base: Robot, rng: np.random.Generator) -> Robot:
         factors["friction"] = factors["damping"] = mass * length
         for what, larger in factors.items():
             robot = replace_at(robot, f"{name}.{what}", larger * attrgetter(f"{name}.{what}")(base))
-    return robot
-
-
-def _within_drives(robot: Robot) -> Robot:
-    """Return the leg with motors no stronger than the currents of its drives make them."""
-    for name in JOINTS:
-        motor, servo = getattr(robot, name).motor, getattr(robot.hardware, name)
-        most = servo.torque_constant * servo.max_current * motor.gear_ratio
-        share = min(most / motor.peak_torque, 1.0)
-        for torque in _TORQUES:
-            value = share * getattr(motor, torque)
-            robot = replace_at(robot, f"{name}.motor.{torque}", value)
     return robot
 
 
@@ -290,19 +289,3 @@ def _fitted(design: Robot, true: Robot, rng: np.random.Generator) -> Robot:
     for link in ("thigh", "shank"):
         told = replace_at(told, f"{link}.mass", getattr(design, link).mass)
     return told
-
-
-def _late(robot: Robot, rng: np.random.Generator) -> Robot:
-    """Return the robot with commands that arrive late."""
-    share = rng.random()
-    latest = _PERIOD if share < _PUNCTUAL + _SOON else _LATEST
-    seconds = 0.0 if share < _PUNCTUAL else float(rng.uniform(0.0, latest))
-    return replace_at(robot, "reality.latency.command", seconds)
-
-
-def _soft_enough(robot: Robot) -> Robot:
-    """Return the robot with transmissions that a training can simulate."""
-    for name in JOINTS:
-        path, most = f"reality.{name}.stiffness", 0.5 * stiffest(robot, name, _STEP)
-        robot = replace_at(robot, path, min(attrgetter(path)(robot), most))
-    return robot

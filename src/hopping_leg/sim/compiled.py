@@ -70,14 +70,10 @@ def inlined(function: Function) -> Function:
 
 def announce(*functions: Callable[..., Any]) -> None:
     """Say on stderr, once, if a function has yet to be compiled. Workers say nothing."""
-    if multiprocessing.parent_process() is None and not all(map(was_compiled, functions)):
+    names = [f"{f.__module__.rpartition('.')[2]}.{f.__name__}" for f in functions]
+    known = FOLDER is not None and all(any(Path(FOLDER).glob(f"*/{n}-*.nbc")) for n in names)
+    if multiprocessing.parent_process() is None and not known:
         say_compiling()
-
-
-def was_compiled(function: Callable[..., Any]) -> bool:
-    """Tell whether a process that ended has left the compiled function behind."""
-    name = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
-    return FOLDER is not None and any(Path(FOLDER).glob(f"*/{name}-*.nbc"))
 
 
 @cache

@@ -1,6 +1,7 @@
 """The table of parameters that the stepper reads: a row per leg, computed from its robot."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -78,7 +79,9 @@ def _row(robot: Robot, timestep: float, fixed_base: bool) -> Records:
     row = np.zeros((), LEG)
     reality = robot.reality
     row["fixed_base"], row["gravity"] = fixed_base, GRAVITY
-    row["elastic"] = [_is_elastic(robot, name) for name in JOINTS]
+    for joint in JOINTS:
+        _check_transmission(robot, joint, timestep)
+    row["elastic"] = ~np.isnan(reality.of_drives("stiffness"))
     guide = robot.boom if robot.boom.radius else robot.rail
     row["rail_damping"], row["rail_friction"] = guide.damping, guide.friction
     for name in ("damping", "friction", "load_friction", "armature", "stop_lower", "stop_upper"):
@@ -91,8 +94,6 @@ def _row(robot: Robot, timestep: float, fixed_base: bool) -> Records:
     _set_ground(row, robot, timestep)
     _set_drives(row, robot, timestep)
     _set_softness(row, robot, timestep)
-    for joint in JOINTS:
-        _check_stiffness(robot, joint, timestep)
     latency = reality.latency
     row["command_latency"], row["command_jitter"] = latency.command, latency.jitter
     row["measurement_latency"] = latency.measurement
@@ -101,16 +102,6 @@ def _row(robot: Robot, timestep: float, fixed_base: bool) -> Records:
             [reality.of_sensors(f"{sensor}_{what}") for sensor in SENSORS]
         )
     return row
-
-
-def _is_elastic(robot: Robot, name: str) -> bool:
-    drive = getattr(robot.reality, name)
-    if drive.backlash and drive.stiffness is None:
-        raise RobotError(
-            f"{robot.name}: 'reality.{name}' has a backlash of {drive.backlash:g} rad but no"
-            " 'stiffness', N m/rad; give the stiffness of gear and belt beyond it."
-        )
-    return drive.stiffness is not None
 
 
 def _set_bodies(row: Records, robot: Robot) -> None:
@@ -145,17 +136,12 @@ def _set_bodies(row: Records, robot: Robot) -> None:
 
 
 def _set_ground(row: Records, robot: Robot, timestep: float) -> None:
-    believed, true = robot.contact, robot.reality.ground
-    time, ratio, friction = (
-        believed_value if true_value is None else true_value
-        for believed_value, true_value in (
-            (believed.time_constant, true.time_constant),
-            (believed.damping_ratio, true.damping_ratio),
-            (believed.friction, true.friction),
-        )
+    stated = {k: v for k, v in vars(robot.reality.ground).items() if v is not None}
+    true = replace(robot.contact, **stated)
+    row["ground_friction"] = max(true.friction, _LEAST_FRICTION)
+    row["contact_stiffness"], row["contact_damping"] = _spring(
+        true.time_constant, true.damping_ratio, timestep
     )
-    row["ground_friction"] = max(friction, _LEAST_FRICTION)
-    row["contact_stiffness"], row["contact_damping"] = _spring(time, ratio, timestep)
     row["stop_stiffness"], row["stop_damping"] = _spring(model.STOP_TIME_CONSTANT, 1.0, timestep)
 
 
@@ -226,12 +212,16 @@ def stiffest(robot: Robot, joint: str, timestep: float) -> float:
     return 1 / (1 / axis.armature + 1 / (link.inertia + link.mass * link.com**2)) / timestep**2
 
 
-def _check_stiffness(robot: Robot, joint: str, timestep: float) -> None:
-    stiffness = getattr(robot.reality, joint).stiffness
-    most = stiffest(robot, joint, timestep)
-    if stiffness is not None and stiffness > most:
+def _check_transmission(robot: Robot, joint: str, timestep: float) -> None:
+    drive, most = getattr(robot.reality, joint), stiffest(robot, joint, timestep)
+    if drive.backlash and drive.stiffness is None:
         raise RobotError(
-            f"{robot.name}: 'reality.{joint}.stiffness' is {stiffness:g} N m/rad, too stiff"
+            f"{robot.name}: 'reality.{joint}' has a backlash of {drive.backlash:g} rad but no"
+            " 'stiffness', N m/rad; give the stiffness of gear and belt beyond it."
+        )
+    if drive.stiffness is not None and drive.stiffness > most:
+        raise RobotError(
+            f"{robot.name}: 'reality.{joint}.stiffness' is {drive.stiffness:g} N m/rad, too stiff"
             f" for a physics step of {timestep:g} s; give at most {most:.3g}, a smaller step, or"
             " leave it out for a rigid one."
         )

@@ -172,6 +172,7 @@ def normalized(robot: Robot, variants: Sequence[Robot], ranges: Sequence[Range])
 
 
 _BACKLASH = "around [M] qdd100 +-0.1 deg at its output"
+_ENCODER = "[M] 14 bit at the rotor"
 _NOISE = "[R] standing noise, leg V2"
 
 
@@ -192,13 +193,7 @@ def _drives() -> tuple[Range, ...]:
                 (f"sensor.{kind}_noise", unit, *[getattr(sensor, f"{kind}_noise")] * 2, _NOISE)
                 for kind, unit in kinds
             ),
-            (
-                "sensor.position_step",
-                "rad",
-                6.4e-5 / belt,
-                6.4e-5 / belt,
-                "[M] 14 bit at the rotor",
-            ),
+            ("sensor.position_step", "rad", 6.4e-5 / belt, 6.4e-5 / belt, _ENCODER),
         )
     )
 
@@ -245,13 +240,10 @@ def draw_twin(seed: int, base: str = "legv2", ranges: Sequence[Range] = TWIN_RAN
     description = f"twin {seed} of {Path(base).stem}, drawn"
     tree: Tree = {"name": f"twin-{seed}", "description": description, "extends": parent}
     for spread in ranges:
-        value = float(f"{spread.sample(rng):.6g}")
-        tree = replace_at(tree, spread.path, _entry(spread, value, seed))
+        value, source = float(f"{spread.sample(rng):.6g}"), spread.source
+        if spread.low < spread.high:
+            drawn = f"seed {seed}, {spread.scale} from {spread.low:g} to {spread.high:g}"
+            source = f"{drawn}: {source}"
+        entry = {"value": value, "unit": spread.unit, "source": source}
+        tree = replace_at(tree, spread.path, entry)
     return Twin(robot_from_tree(tree, f"twin {seed}"), tree)
-
-
-def _entry(spread: Range, value: float, seed: int) -> Tree:
-    drawn = f"seed {seed}, {spread.scale} from {spread.low:g} to {spread.high:g}"
-    fixed = spread.low == spread.high
-    source = spread.source if fixed else f"{drawn}: {spread.source}"
-    return {"value": value, "unit": spread.unit, "source": source}
