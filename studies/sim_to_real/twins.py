@@ -104,7 +104,7 @@ def simulated(source: str, *, belt: bool = False) -> Robot:
 
 def disturbance_of(robot: Robot, noise: Noise = "own") -> NoiseAndDelay:
     """Return what a leg is tried with on top of what it brings: nothing, if it brings anything."""
-    noisy = robot.reality.neutral if noise == "own" else noise == "on"
+    noisy = robot.reality == NO_MISMATCH if noise == "own" else noise == "on"
     return NoiseAndDelay() if noisy else NO_NOISE
 
 

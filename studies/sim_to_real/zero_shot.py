@@ -27,7 +27,7 @@ from hopping_leg.deploy.supervisor import State, SupervisorState, supervise
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import runner, statistics, trials
 from hopping_leg.hop_detection import find_hops, measure_hops
-from hopping_leg.robot import JOINTS, Robot, load_robot, parent_robot
+from hopping_leg.robot import JOINTS, NO_MISMATCH, Robot, load_robot, parent_robot
 from studies.shared import Row, do_all, show_rows
 from studies.sim_to_real.twins import LEAST_TWINS, Noise, disturbance_of, drawn_twin, fingerprint
 
@@ -56,7 +56,7 @@ _SHARES: dict[str, Callable[[Row], tuple[int, int]]] = {
 def believed_of(source: str) -> Robot:
     """Return what is told of a leg: of one with [reality] what its file extends, else itself."""
     robot, parent = load_robot(source), parent_robot(source)
-    if robot.reality.neutral or parent is None:
+    if robot.reality == NO_MISMATCH or parent is None:
         return robot
     return load_robot(parent)
 

@@ -15,7 +15,7 @@ from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.recording_format import PAIRS
 from hopping_leg.identify.result import as_json, save_robot
 from hopping_leg.io import replace_at
-from hopping_leg.robot import check_physics, load_robot, robot_text
+from hopping_leg.robot import NO_MISMATCH, check_physics, load_robot, robot_text
 from tests.identify.fitting import EFFORT, RATE, TRUTH, TWIN, identified, options, run
 from tests.identify.twin import BELT, LEG, changed, hops, record, swing, tracked
 
@@ -39,7 +39,7 @@ def test_recordings_to_judge_by_replace_the_split_and_nobody_believes_a_reality(
     found = identify([run()], load_robot("twin"), validate=[run(1.0)], options=options())
     assert [r.name for r in found.fit] == [run().name]
     assert [r.name for r in found.held] == [run(1.0).name]
-    assert found.robot.reality.neutral
+    assert found.robot.reality == NO_MISMATCH
 
 
 def test_a_belt_is_found_from_a_far_start_and_what_is_stated_of_it_stays(tmp_path):

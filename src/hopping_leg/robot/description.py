@@ -61,8 +61,13 @@ class Description:
             self.name = spec.modelname.strip() or "leg"
             self.loops = len(spec.equalities)
             """Constraints that close a loop, which are left out."""
-            if root.tag == "mujoco":
-                self._refuse_heavy_meshes(spec)
+            for geom in filter(_needs_file, spec.geoms if root.tag == "mujoco" else ()):
+                body, weighs = geom.parent, geom.mass > 0 or (geom.mass != 0 and geom.density > 0)
+                if weighs and not body.explicitinertial and body.name != "world":
+                    raise RobotError(
+                        f"{path}: body '{body.name}' weighs what its mesh '{geom.meshname}' weighs,"
+                        " and meshes are not read; give the body an <inertial>."
+                    )
             shaped = [bool(b.explicitinertial or b.geoms) for b in spec.bodies]
             _leave_out(spec)
             with warnings.catch_warnings(action="ignore"):  # of what is deprecated
@@ -78,15 +83,6 @@ class Description:
             raise RobotError(f"{path} has no gravity, which says where down is.")
         self.up = -self.model.opt.gravity / strength
         """Against gravity, unit vector, (3,)."""
-
-    def _refuse_heavy_meshes(self, spec: mujoco.MjSpec) -> None:
-        for geom in filter(_needs_file, spec.geoms):
-            body, weighs = geom.parent, geom.mass > 0 or (geom.mass != 0 and geom.density > 0)
-            if weighs and not body.explicitinertial and body.name != "world":
-                raise RobotError(
-                    f"{self.origin}: body '{body.name}' weighs what its mesh '{geom.meshname}'"
-                    " weighs, and meshes are not read; give the body an <inertial>."
-                )
 
     def joint(self, number: int) -> str:
         """Return a joint's name."""

@@ -64,12 +64,23 @@ def get_spec(
     spec.geom("knee_cap").size[0] = robot.knee_cap.radius
     spec.geom("foot").size[0] = robot.foot.radius
     spec.geom("foot").pos = spec.site("foot").pos = [0, 0, -robot.shank.length]
-    _set_contact(spec, robot)
+    floor = spec.geom("floor")
+    floor.priority = 1
+    floor.solref = [robot.contact.time_constant, robot.contact.damping_ratio]
+    floor.friction[0] = robot.contact.friction
+    floor.contype, floor.conaffinity = 0 if fixed_base else 1, 0
+    for name in ("base", "knee_cap", "foot"):
+        geom = spec.geom(name)
+        geom.contype, geom.conaffinity = 0, 1
     for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
-        _add_motor(spec, name, joint)
+        limit = joint.motor.torque_limit
+        actuator = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        actuator.set_to_motor()
+        actuator.gear[0] = joint.belt_ratio
+        actuator.ctrllimited = True
+        actuator.ctrlrange = [-limit, limit]
     if fixed_base:
         spec.delete(spec.joint("rail"))
-        spec.geom("floor").contype = 0
     return spec
 
 
@@ -109,26 +120,6 @@ def _set_inertia(body: mujoco.MjsBody, mass: float, com_z: float, inertia: float
     body.mass = mass
     body.ipos = [0, 0, com_z]
     body.inertia = [inertia, inertia, min(inertia, _THIN)]
-
-
-def _set_contact(spec: mujoco.MjSpec, robot: Robot) -> None:
-    floor = spec.geom("floor")
-    floor.priority = 1
-    floor.solref = [robot.contact.time_constant, robot.contact.damping_ratio]
-    floor.friction[0] = robot.contact.friction
-    floor.contype, floor.conaffinity = 1, 0
-    for name in ("base", "knee_cap", "foot"):
-        geom = spec.geom(name)
-        geom.contype, geom.conaffinity = 0, 1
-
-
-def _add_motor(spec: mujoco.MjSpec, name: str, joint: Joint) -> None:
-    limit = joint.motor.torque_limit
-    actuator = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    actuator.set_to_motor()
-    actuator.gear[0] = joint.belt_ratio
-    actuator.ctrllimited = True
-    actuator.ctrlrange = [-limit, limit]
 
 
 def to_urdf(robot: Robot) -> str:

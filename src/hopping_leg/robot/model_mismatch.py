@@ -105,11 +105,6 @@ class ModelMismatch:
     ground: GroundMismatch = field(default_factory=GroundMismatch)
 
     @property
-    def neutral(self) -> bool:
-        """Whether the leg behaves as the simulator for training has it."""
-        return self == NO_MISMATCH
-
-    @property
     def in_training(self) -> "ModelMismatch":
         """What of it training simulates: transmissions with losses, delay, jitter of commands."""
         kept = ("backlash", "stiffness", "stiffness_damping", "efficiency")

@@ -13,7 +13,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.errors import RobotError
 from hopping_leg.io import quantity
 from hopping_leg.robot.hardware import Hardware
-from hopping_leg.robot.model_mismatch import ModelMismatch
+from hopping_leg.robot.model_mismatch import NO_MISMATCH, ModelMismatch
 
 JOINTS = ("hip", "knee")
 """Actuated joints, in the order of every pair in this package."""
@@ -256,7 +256,7 @@ class Robot:
     def _digest(self, *without: str) -> str:
         values = dataclasses.asdict(self)
         del values["name"], values["description"], values["kind"], values["hardware"]
-        if self.reality.neutral:
+        if self.reality == NO_MISMATCH:
             del values["reality"]
         if self.boom == Boom():
             del values["boom"]
