@@ -2,7 +2,7 @@ import pytest
 
 from hopping_leg.evaluate import figures as drawing
 from hopping_leg.evaluate.report import draw_report_figures
-from hopping_leg.evaluate.trials import load_run, save_traces
+from hopping_leg.evaluate.trials import load_run
 from hopping_leg.figures import controller_colours, encode
 from hopping_leg.trace import Trace
 
@@ -29,7 +29,9 @@ def test_controllers_beside_each_other_share_their_axes_and_keep_their_colours(f
 
 
 def test_the_gallery_from_stored_traces_is_the_reports(judged, tmp_path):
-    again = [load_run(path) for path in save_traces(judged.runs, tmp_path)]
+    for run in judged.runs:
+        run.trace.save(tmp_path / run.file_name)
+    again = [load_run(tmp_path / run.file_name) for run in judged.runs]
     assert [(r.controller, r.trial.kind, r.repeat) for r in again] == [
         (r.controller, r.trial.kind, r.repeat) for r in judged.runs
     ]

@@ -30,11 +30,6 @@ def plan(setup):
     return make
 
 
-def arrays(made):
-    found = made.perturbation
-    return (made.commands, found.torque, found.force, found.ground)
-
-
 @pytest.mark.parametrize("axis", AXES, ids=lambda axis: axis.name)
 def test_a_neutral_level_is_the_plain_rollout_bit_for_bit(setup, plan, spring, axis):
     made = plan(axis.name, [axis.neutral], seconds=2.6)
@@ -57,16 +52,6 @@ def test_levels_and_moderate_ranges_lie_around_the_neutral_level(robot, axis):
     for case in altered:
         assert case.robot.thigh.length == robot.thigh.length
     assert LegSimulator(robot, len(altered), robots=[case.robot for case in altered]).count
-
-
-@pytest.mark.parametrize("axis", ["pushes", "torque-noise", JOINT.name])
-def test_the_seed_fixes_what_happens(plan, axis):
-    first, again, other = (plan(axis, seed=seed) for seed in (1000, 1000, 1001))
-    assert first.seed == again.seed != other.seed
-    for one, same in zip(arrays(first), arrays(again), strict=True):
-        np.testing.assert_array_equal(one, same)
-    assert first.cases == again.cases
-    assert any((a != b).any() for a, b in zip(arrays(first), arrays(other), strict=True))
 
 
 def test_levels_differ_in_size_only(plan):
@@ -103,6 +88,7 @@ def test_a_suite_repeats_and_names_its_rows(setup, spring):
     assert progress == sorted(progress)
     assert progress[-1] == 1
     assert json.dumps(first, allow_nan=False) == json.dumps(run_suite(judged, tiny))
+    assert run_suite(judged, dataclasses.replace(tiny, seed=1))["levels"] != first["levels"]
     assert len({encode(draw_robustness(first), "svg") for _ in range(2)}) == 1
     assert [row["axis"] for row in first["scores"]] == [*names, "overall"]
     assert [axis["name"] for axis in first["axes"]] == [*names]

@@ -109,7 +109,6 @@ def run(args: Evaluate) -> None:
 def keep(args: Evaluate, judged: "EvaluationRun", notes: Sequence[str] = ()) -> list[Path | None]:
     """Write what was asked for, notes before the evaluation's own; return the files."""
     from hopping_leg.evaluate.report import write_report
-    from hopping_leg.evaluate.trials import save_traces
 
     notes = [*notes, *judged.evaluation.notes]
     evaluation = replace(judged.evaluation, command=COMMAND.get(), notes=notes)
@@ -118,8 +117,8 @@ def keep(args: Evaluate, judged: "EvaluationRun", notes: Sequence[str] = ()) -> 
         numbers, traces = numbers or args.out / "evaluation.json", traces or args.out / "traces"
         report = args.out / "report.html"
     options.save_json(numbers, evaluation.to_json())
-    if traces:
-        save_traces(judged.runs, traces)
+    for run in judged.runs if traces else ():
+        run.trace.save(traces / run.file_name)
     if report:
         io.write_atomically(report, write_report(replace(judged, evaluation=evaluation)))
     return [numbers, report, traces]

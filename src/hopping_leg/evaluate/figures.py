@@ -6,7 +6,6 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hopping_leg import hop_detection
@@ -26,29 +25,26 @@ def draw_heights(traces: Mapping[str, Trace]) -> Figure:
     """Draw base height, command and apexes over time, a panel per controller."""
     figure, axes = panels(len(traces))
     for (panel,), (name, paint) in zip(axes, controller_colours(traces).items(), strict=True):
-        _draw_heights(panel, traces[name], paint)
+        trace = traces[name]
+        time, command = trace.column("time_s"), trace.column("command_m")
+        height, hops = trace.column("height_m"), hop_detection.trace_hops(trace)
+        panel.plot(time, height, color=paint, linewidth=0.8, alpha=0.8, label="base height")
+        panel.step(time, command, where="post", color=COMMAND, linewidth=1.4, label="command")
+        look: dict[str, Any] = {"color": paint, "markersize": 6, "label": "apex in flight"}
+        panel.plot(time[hops.tick], hops.apex, ".", **look)
+        look = {"color": "black", "linewidth": 1.6, "zorder": 4, "label": "median apex"}
+        for start, end in stretches(command):
+            begin = time[start] + (SWITCH_SECONDS if start else START_SECONDS)
+            apex = hops.apex[(hops.tick < end) & (time[hops.tick] >= begin)]
+            if len(apex):
+                panel.hlines(np.median(apex), begin, time[end - 1], **look)
+                look["label"] = "_"
+        panel.margins(x=0.01)
         panel.set_title(name)
         panel.set_ylabel("base height / m")
     axes[-1][0].set_xlabel("time / s")
     figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside upper right", ncols=4)
     return figure
-
-
-def _draw_heights(axes: Axes, trace: Trace, paint: str) -> None:
-    time, command = trace.column("time_s"), trace.column("command_m")
-    height, hops = trace.column("height_m"), hop_detection.trace_hops(trace)
-    axes.plot(time, height, color=paint, linewidth=0.8, alpha=0.8, label="base height")
-    axes.step(time, command, where="post", color=COMMAND, linewidth=1.4, label="command")
-    axes.plot(time[hops.tick], hops.apex, ".", color=paint, markersize=6, label="apex in flight")
-    label = "median apex"
-    for start, end in stretches(command):
-        begin = time[start] + (SWITCH_SECONDS if start else START_SECONDS)
-        apex = hops.apex[(hops.tick < end) & (time[hops.tick] >= begin)]
-        if len(apex):
-            look: dict[str, Any] = {"color": "black", "linewidth": 1.6, "zorder": 4}
-            axes.hlines(np.median(apex), begin, time[end - 1], label=label, **look)
-            label = "_"
-    axes.margins(x=0.01)
 
 
 @styled

@@ -14,7 +14,6 @@ of the energy E to sqrt(V_0^2 + 2 E / C).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -96,17 +95,6 @@ def motor_load(parts: Sequence[Trace], robot: Robot) -> MotorLoad:
         bus_voltage_rise_v=float(np.sqrt(start**2 + 2 * stored / capacitance) - start),
         stop_contacts=None if np.isnan(rms).any() else sum(events(touch > 0) for touch in stops),
     )
-
-
-def constants(robot: Robot) -> dict[str, Any]:
-    """Return what the loads depend on beside the run, as JSON values."""
-    names = ("torque_constant", "winding_resistance", "thermal_time_constant")
-    return {
-        "bus_voltage_v": robot.hardware.bus_voltage,
-        "bus_capacitance_f": robot.hardware.bus_capacitance,
-        **{name: [getattr(servo, name) for servo in robot.hardware.servos] for name in names},
-        "thermal_minutes": "null where no motor's RMS torque exceeds its rated one: never limited",
-    }
 
 
 def unknown() -> MotorLoad:

@@ -152,18 +152,14 @@ def compare(file: Path, runs: Sequence[Run]) -> tuple[list[Prediction], list[str
     if not any(p.quantity in _JUDGES for p in compared):
         least = metrics.START_SECONDS + _LEAST_SECONDS
         raise UsageError(f"No trace hops for {least:g} s at a height that {file} predicts.")
-    return compared, [*notes, _verdict(compared)]
-
-
-def _verdict(compared: Sequence[Prediction]) -> str:
-    """Return in a sentence whether reality is within what was predicted, at every command."""
     judge = next(name for name in _JUDGES if any(name == p.quantity for p in compared))
     inside = [p.holds for p in compared if p.quantity == judge]
     single = [p for p in compared if p.quantity == judge.removeprefix("median_")]
     count = sum(p.values for p in single)
     share = sum(p.inside_share * p.values for p in single) / count
-    return (
+    verdict = (
         f"Reality is {'' if all(inside) else 'not '}within what was predicted: {judge} is in its"
         f" 90 % interval at {sum(inside)} of {len(inside)} commands, and {share:.0%} of {count}"
         f" {'hops' if judge.startswith('median') else 'runs'} are."
     )
+    return compared, [*notes, verdict]

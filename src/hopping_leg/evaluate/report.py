@@ -20,7 +20,12 @@ def draw_report_figures(evaluation: Evaluation, runs: Sequence[Run]) -> dict[str
     for kind in ("staircase", "sequence"):
         if shown := _first(run for run in runs if run.trial.kind == kind):
             found[kind] = figures.draw_heights(shown)
-    examples = _examples(runs)
+    # A run of every controller at one command, the middle one or near it.
+    single = [run for run in runs if len(run.trial.steps) == 1]
+    single = [run for run in single if run.trial.kind == "fixed"] or single
+    middle = median_high(sorted({run.trial.steps[0][0] for run in single} or {0.0}))
+    near = _first(sorted(single, key=lambda run: abs(run.trial.steps[0][0] - middle)))
+    examples = {name: near[name] for name in _first(single)}
     if examples and not found:
         found["heights"] = figures.draw_heights(examples)
     if any(row.hops for row in evaluation.summary):
@@ -38,17 +43,6 @@ def _first(runs: Iterable[Run]) -> dict[str, Trace]:
     for run in runs:
         found.setdefault(run.controller, run.trace)
     return found
-
-
-def _examples(runs: Sequence[Run]) -> dict[str, Trace]:
-    """Return the trace of a run of every controller at one command, the middle one or near it."""
-    single = [run for run in runs if len(run.trial.steps) == 1]
-    single = [run for run in single if run.trial.kind == "fixed"] or single
-    if not single:
-        return {}
-    middle = median_high(sorted({run.trial.steps[0][0] for run in single}))
-    near = _first(sorted(single, key=lambda run: abs(run.trial.steps[0][0] - middle)))
-    return {name: near[name] for name in _first(single)}
 
 
 def write_report(judged: runner.EvaluationRun) -> bytes:

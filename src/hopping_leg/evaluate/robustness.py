@@ -153,30 +153,22 @@ def _events(case: Case, suite: Suite) -> tuple[Array, Array, Array, Array]:
     rate = suite.setup.rate
     time = np.arange(round(suite.seconds * rate)) / rate
     torque = case.torque_noise * rng.standard_normal((len(time), 2))
-    force = case.push / PUSH_SECONDS * _pushes(rng, len(time), rate)
+    pushes = np.zeros(len(time))  # with the sign, once in each second but the first
+    length = max(1, round(PUSH_SECONDS * rate))
+    for whole in range(1, round(len(time) / rate)):
+        start = round((whole + rng.uniform(0, 1 - PUSH_SECONDS)) * rate)
+        pushes[start : start + length] = rng.choice((-1.0, 1.0))
+    force = case.push / PUSH_SECONDS * pushes
     at = np.floor(time / GROUND_SECONDS).astype(int)
     ground = case.ground * rng.choice((-1, 1)) * np.array([0, 1, 0, -1])[at % 4]
-    return _stepped(case, suite.commands, time), torque, force, ground
-
-
-def _pushes(rng: np.random.Generator, ticks: int, rate: float) -> Array:
-    """Return when is pushed, with the sign, (ticks,): once in each second but the first."""
-    pushes = np.zeros(ticks)
-    length = max(1, round(PUSH_SECONDS * rate))
-    for second in range(1, round(ticks / rate)):
-        start = round((second + rng.uniform(0, 1 - PUSH_SECONDS)) * rate)
-        pushes[start : start + length] = rng.choice((-1.0, 1.0))
-    return pushes
-
-
-def _stepped(case: Case, commands: Sequence[float], time: Array) -> Array:
-    """Return the command over time, m: away by a step and back, within the suite's heights."""
-    low, high = min(commands), max(commands)
+    # The command steps away and back, within the suite's heights.
+    low, high = min(suite.commands), max(suite.commands)
     share = (case.command - low) / (high - low) if high > low else 0.5
     bottom = case.command - share * case.command_step
     pair = (bottom, bottom + case.command_step)
     first, second = pair if share <= 0.5 else pair[::-1]
-    return np.where(np.floor(time / SWITCH_SECONDS) % 2 == 0, first, second)
+    command = np.where(np.floor(time / SWITCH_SECONDS) % 2 == 0, first, second)
+    return command, torque, force, ground
 
 
 def outcome(case: Case, windows: Sequence[metrics.HopWindow]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from hopping_leg.controllers.command_schedule import check_heights, within
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import motor_load, prediction, result, trials
+from hopping_leg.evaluate import prediction, result, trials
 from hopping_leg.io import versions
 from hopping_leg.robot import JOINTS, TIMESTEP, Robot, braking_times
 from hopping_leg.sim import NO_NOISE
@@ -47,7 +47,14 @@ def load_entries(names: Sequence[str], robot: Robot, rate: float) -> list[Entry]
     tables. PolicyError says that a file is unreadable or does not fit, UsageError that there is no
     such controller.
     """
-    return [_load(text, robot, rate) for text in dict.fromkeys(names)]
+    entries = []
+    for text in dict.fromkeys(names):
+        label, _, source = (text, "", text) if Path(text).exists() else text.rpartition("=")
+        controller = load_controller(source, robot, rate=rate, simulated=True)
+        label = label or source
+        note = controller.stranger(robot, label) if isinstance(controller, Policy) else ""
+        entries.append(Entry(label, controller, notes=(note,) if note else ()))
+    return entries
 
 
 def check_entries(entries: Sequence[Entry], commands: Sequence[float]) -> None:
@@ -60,14 +67,6 @@ def check_entries(entries: Sequence[Entry], commands: Sequence[float]) -> None:
             raise UsageError(f"Controller '{entry.label}' was named twice; name each one once.")
         if entry.command_range:
             check_heights(commands, entry.command_range, entry.label)
-
-
-def _load(text: str, robot: Robot, rate: float) -> Entry:
-    label, _, source = (text, "", text) if Path(text).exists() else text.rpartition("=")
-    label = label or source
-    controller = load_controller(source, robot, rate=rate, simulated=True)
-    note = controller.stranger(robot, label) if isinstance(controller, Policy) else None
-    return Entry(label, controller, notes=(note,) if note else ())
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,12 @@ def evaluate(
             on_progress=functools.partial(on_progress, entry.label),
         )  # fmt: skip
         notes += entry.notes
-        notes += _note_left_out(entry, [t for t in planned if t not in fitting])
+        if entry.command_range and (left_out := [t for t in planned if t not in fitting]):
+            low, high = entry.command_range
+            names = ", ".join(
+                f"{t.kind} {t.steps[0][0]:g} m" if len(t.steps) == 1 else t.kind for t in left_out
+            )
+            notes += [f"{entry.label} was made for {low:g} to {high:g} m; left out: {names}."]
         notes += _note_stopped(entry.label, own, setup)
         runs += own
     measured = result.tabulate(runs, seed, world.robot)
@@ -128,7 +132,6 @@ def evaluate(
         "floor_meaning": trials.FLOORS[floor],
         "contact_time_constant_s": world.robot.contact.time_constant,
         "contact_damping_ratio": world.robot.contact.damping_ratio,
-        "motors": motor_load.constants(world.robot),
         "seed": seed,
         "seeds": repeats,
     }
@@ -151,16 +154,6 @@ def _note_setup(setup: RolloutConfig) -> list[str]:
             " and delay came on top; --no-noise meets it as it is."
         )
     return notes
-
-
-def _note_left_out(entry: Entry, left_out: Sequence[trials.Trial]) -> list[str]:
-    if not left_out or entry.command_range is None:
-        return []
-    low, high = entry.command_range
-    names = ", ".join(
-        f"{t.kind} {t.steps[0][0]:g} m" if len(t.steps) == 1 else t.kind for t in left_out
-    )
-    return [f"{entry.label} was made for {low:g} to {high:g} m; left out: {names}."]
 
 
 def _note_stopped(label: str, runs: Sequence[trials.Run], setup: RolloutConfig) -> list[str]:

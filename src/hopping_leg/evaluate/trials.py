@@ -141,13 +141,6 @@ def run_trials(
     return sorted(runs, key=lambda run: (trials.index(run.trial), run.repeat))
 
 
-def save_traces(runs: Sequence[Run], directory: Path) -> list[Path]:
-    """Write the trace of every run; return the files."""
-    for run in runs:
-        run.trace.save(directory / run.file_name)
-    return [directory / run.file_name for run in runs]
-
-
 def load_run(path: Path) -> Run:
     """Load a trace as a run; traces from elsewhere count as fixed trials of their own.
 
