@@ -85,19 +85,3 @@ def test_the_policy_is_the_mean_of_the_actors_so_far():
     for first, last, actor in zip(means[1], made.network().parameters(), now, strict=True):
         np.testing.assert_allclose(last.detach(), 0.97 * first + 0.03 * actor, atol=1e-6)
         assert not np.allclose(first, actor, atol=1e-6)
-
-
-def test_a_policy_file_gives_the_mean_actions():
-    changes = {"task.episode": 9.0, "task.random_episode_start": False, "log_std": (-20.0, -20.0)}
-    made = learner(TINY_RL.replace(changes))
-    with torch.no_grad():
-        made.actor[-1].weight.normal_()
-    made._average = made.actor
-    file, task, measured, step = policy_file(TINY_RL, made), made.task, [], made.task.step
-    task.step = lambda action: (measured.append(task.measurement), step(action))[-1]
-    actions = made._collect().actions.numpy()
-    file.reset(task.count)
-    for seen, action in zip(measured, actions, strict=True):
-        full = TINY_RL.task.action_torque
-        np.testing.assert_allclose(file.act(seen), action.clip(-1, 1) * full, atol=2e-4)
-    assert np.ptp(actions) > 0.05

@@ -1,4 +1,4 @@
-"""Soft actor-critic: what its actor sees, and that a policy file is its actor."""
+"""Soft actor-critic: what its actor sees, and that its policy is its actor."""
 
 import numpy as np
 import pytest
@@ -6,38 +6,19 @@ import torch
 from stable_baselines3.common.vec_env import VecMonitor
 
 from hopping_leg.envs import HoppingTask, TaskConfig
-from hopping_leg.envs.observation import Observation, sample_scaling
 from hopping_leg.rl.sac import TaskVecEnv
-from hopping_leg.sim.channel import Measurement
-from tests.rl.learners import ROBOT, TINY, learner, policy_file
+from tests.rl.learners import ROBOT, TINY, learner
 
 
-def measurement(count):
-    rng = np.random.default_rng(0)
-    return Measurement(
-        rng.uniform(-3, 3, (count, 3, 2)),
-        rng.uniform(-20, 20, (count, 3, 2)),
-        rng.uniform(0.25, 0.35, (count, 3)),
-        np.zeros((count, 3)),
-    )
-
-
-def test_policy_file_gives_the_actors_torques():
-    recipe = TINY.replace(actor=(32, 32), critic=(32, 32))
-    sac = learner(recipe)
+def test_the_policy_is_what_the_algorithm_predicts():
+    sac = learner(TINY.replace(actor=(32, 32), critic=(32, 32)))
+    seen = np.random.default_rng(0).normal(size=(50, *sac.observation_space.shape))
+    expected, _ = sac.predict(seen.astype(np.float32), deterministic=True)
+    measured = torch.from_numpy(seen[:, : sac.env.task.observation.size]).float()
     with torch.no_grad():
-        for parameter in sac.policy.parameters():
-            parameter.mul_(4.0)
-    policy = policy_file(recipe, sac)
-    policy.reset(50)
-    m = measurement(50)
-    samples = np.concatenate([m.q, m.qd, m.command[..., None]], axis=-1)
-    seen = Observation(sample_scaling(ROBOT, recipe.task)).view(samples)
-    truth = np.zeros((50, sac.observation_space.shape[0] - seen.shape[1]), np.float32)
-    expected, _ = sac.predict(np.concatenate([seen, truth], axis=1), deterministic=True)
-    action = policy.act(m) / recipe.task.action_torque
+        action, _ = sac.network()(measured, measured[:, :0])
     np.testing.assert_allclose(action, expected, atol=1e-5)
-    assert np.abs(action).max() > 0.2
+    assert np.ptp(expected) > 0.01
 
 
 def test_the_actor_sees_measurements_and_the_critics_the_true_state():

@@ -40,11 +40,6 @@ _HELD_STIFFNESS, _HELD_DAMPING = 2.0, 0.05
 """Of the stiff legs' joint PD: actions per rad and rad/s."""
 
 
-def cosine(left: float) -> float:
-    """Fall from 1 to 0.02 as the share of the budget that is left falls from 1 to 0."""
-    return 0.02 + 0.98 * (1 + math.cos(math.pi * (1 - left))) / 2
-
-
 @dataclass(frozen=True)
 class DaggerConfig:
     """Numbers of a distillation."""
@@ -118,23 +113,20 @@ class Dagger(Learner):
         )  # fmt: skip
         self._draws = torch.Generator().manual_seed(seed)
         self._mixing = np.random.default_rng([seed, 1])
-        self._most_force = self._most_forces() if config.impulse else None
-        self._begin(task.reset())
-
-    def _most_forces(self) -> Array:
-        """Return the largest force on each base, N, (n,), 0 for most."""
-        legs = [leg.true for leg in self.task.task_legs] or [self.task.robot]
-        momentum = [leg.mass * math.sqrt(GRAVITY * robot_numbers.leg_length(leg)) for leg in legs]
-        pushed = self._mixing.random(self.task.count) < _PUSHED
-        most = np.array(momentum) * self.config.impulse * self.task.options.rate
-        return np.where(pushed, most, 0.0)
-
-    def _begin(self, observation: Any) -> None:  # noqa: ANN401
-        self.teacher.reset(self.task.count)
-        self._seen = observation
-        self._begun: BoolArray = np.ones(self.task.count, np.bool_)
-        self._held, self._posture = np.zeros(self.task.count), np.zeros((self.task.count, 2))
-        self._memory = torch.zeros(self.task.count, self.student.memory_size)
+        self._most_force: Array | None = None
+        """Largest force on each base, N, (n,), 0 for most; None where none is pushed."""
+        if config.impulse:
+            legs = [leg.true for leg in task.task_legs] or [task.robot]
+            lengths = map(robot_numbers.leg_length, legs)
+            momentum = [r.mass * math.sqrt(GRAVITY * n) for r, n in zip(legs, lengths, strict=True)]
+            pushed = self._mixing.random(task.count) < _PUSHED
+            most = np.array(momentum) * config.impulse * task.options.rate
+            self._most_force = np.where(pushed, most, 0.0)
+        self._seen: Any = task.reset()
+        self.teacher.reset(task.count)
+        self._begun: BoolArray = np.ones(task.count, np.bool_)
+        self._held, self._posture = np.zeros(task.count), np.zeros((task.count, 2))
+        self._memory = torch.zeros(task.count, self.student.memory_size)
         self._label = self._teach()
 
     def train_until(self, steps: int, callback: Callable[[], bool], log_interval: int) -> None:
@@ -147,11 +139,6 @@ class Dagger(Learner):
                 self._train()
                 self._buffer.add(rollout.result())
 
-    @property
-    def mixing(self) -> float:
-        """Chance that the teacher acts for the student, leg by leg and tick by tick."""
-        return max(0.0, 1 - self.share / self.config.mixing_share)
-
     def _collect(self) -> LabelledRollout:
         began = time.monotonic()
         memory = self._memory.numpy().copy()
@@ -161,14 +148,15 @@ class Dagger(Learner):
         return LabelledRollout(seen, labels, weights, hidden, begun, memory)
 
     def _step(self) -> tuple[Any, ...]:
-        seen, label, begun = self._seen, self._label, self._begun
-        pushing = np.where(self.teacher.pushing, self.config.push_weight, 1.0)
-        weight = np.where(self.teacher.folding, self.config.fold_weight, pushing)
+        seen, label, begun, config = self._seen, self._label, self._begun, self.config
+        pushing = np.where(self.teacher.pushing, config.push_weight, 1.0)
+        weight = np.where(self.teacher.folding, config.fold_weight, pushing)
         hidden = self._hidden.view() if self._hidden else np.empty((len(begun), 0), np.float32)
         with torch.no_grad():
             fresh = torch.from_numpy(~begun)[:, None]
             action, self._memory = self._actor(torch.from_numpy(seen), self._memory * fresh)
-        taught = self._mixing.random(len(begun)) < self.mixing
+        # Leg by leg and tick by tick the teacher acts for the student, ever less often.
+        taught = self._mixing.random(len(begun)) < max(0.0, 1 - self.share / config.mixing_share)
         step = self._act(np.where(taught[:, None], label, action.numpy()))
         if self._hidden:
             self._hidden.update(step.apex_error, step.terminated | step.truncated)
@@ -208,22 +196,15 @@ class Dagger(Learner):
         if not self._buffer.added:
             return
         began = time.monotonic()
+        cosine = (1 + math.cos(math.pi * (1 - self._left))) / 2  # falls from 1 to 0
         for group in self.optimizer.param_groups:
-            group["lr"] = self.config.learning_rate * cosine(self._left)
+            group["lr"] = self.config.learning_rate * (0.02 + 0.98 * cosine)
         losses = [self._gradient_step() for _ in range(self.config.gradient_steps)]
         self.logger.record("train/loss", float(np.mean(losses)))
         self.seconds["gradient steps"] += time.monotonic() - began
 
     def _gradient_step(self) -> float:
-        loss = self._loss()
-        self.optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
-        torch.nn.utils.clip_grad_norm_(self.student.parameters(), 1.0)
-        self.optimizer.step()
-        return loss.item()
-
-    def _loss(self) -> torch.Tensor:
-        """Return how far the student's actions, and its guesses, are off in some ticks."""
+        """Learn from some ticks; return how far actions, and guesses, were off."""
         config = self.config
         batch, actions, guesses = self.student.recall(self._buffer, config.batch_size, self._draws)
         if config.outlier:
@@ -237,7 +218,11 @@ class Dagger(Learner):
             known = (batch.weights > 0)[..., None]
             missed = functional.mse_loss(guesses * known, batch.hidden * known)
             loss = loss + config.hidden_weight * missed
-        return loss
+        self.optimizer.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(self.student.parameters(), 1.0)
+        self.optimizer.step()
+        return loss.item()
 
     def network(self) -> Student:
         """Return the student as it stands."""

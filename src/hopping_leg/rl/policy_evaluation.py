@@ -95,19 +95,16 @@ def evaluate_policy(
 
 
 def input_range(
-    controller: Controller, robot: Robot, commands: tuple[float, ...], rate: float
+    policy: Policy, robot: Robot, commands: tuple[float, ...], rate: float
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the least and the largest ``controllers.policy.INPUTS`` in trials at commands, m.
 
     Of a policy for any leg, commands and velocities are those of a leg of the paper's size.
     """
-    scale = 1.0
-    if isinstance(controller, Policy):
-        controller.set_robot(robot)
-        scale = controller.scale
-    schedule = np.tile(np.multiply(scale, commands), (round(_RANGE_SECONDS * rate), 1))
-    run = rollout(controller, RolloutConfig(robot, rate=rate), schedule, FINAL_SEEDS[0])
-    units = {"position_rad": 1.0, "velocity_rad_s": np.sqrt(scale)}
+    policy.set_robot(robot)
+    schedule = np.tile(np.multiply(policy.scale, commands), (round(_RANGE_SECONDS * rate), 1))
+    run = rollout(policy, RolloutConfig(robot, rate=rate), schedule, FINAL_SEEDS[0])
+    units = {"position_rad": 1.0, "velocity_rad_s": np.sqrt(policy.scale)}
     columns = [
         unit * run.data[f"{joint}_{name}"] for name, unit in units.items() for joint in JOINTS
     ]
@@ -117,23 +114,22 @@ def input_range(
 def score(results: list[CommandResult]) -> float:
     """Return how bad a policy is, m.
 
-    Mean over commands of ``command_score`` and of a penalty where hops are skipped or the body hits
-    the ground at all, and a penalty for every pair of neighbouring commands of which the higher one
-    does not give the higher hops.
+    Mean over commands of median error + spread + penalties, 1 without hops, and of a penalty where
+    hops are skipped or the body hits the ground at all, and a penalty for every pair of
+    neighbouring commands of which the higher one does not give the higher hops.
     """
+
+    def at_command(result: CommandResult) -> float:
+        if result.hops == 0:
+            return 1.0
+        faults = (result.skipped_hops + result.body_contact_ticks) / result.hops
+        return abs(result.median_error_m) + result.std_m + _PENALTY * min(faults, 3.0)
+
     heights = [v.command_m + v.median_error_m for v in results]
     disordered = sum(not low < high for low, high in itertools.pairwise(heights))
     unreliable = [v.skipped_hops + v.body_contact_ticks > 0 for v in results]
     worse = _UNRELIABLE * float(np.mean(unreliable)) + _DISORDER * disordered
-    return float(np.mean([command_score(v) for v in results])) + worse
-
-
-def command_score(result: CommandResult) -> float:
-    """Return median error + spread + penalties at a command, m; 1 without hops."""
-    if result.hops == 0:
-        return 1.0
-    faults = (result.skipped_hops + result.body_contact_ticks) / result.hops
-    return abs(result.median_error_m) + result.std_m + _PENALTY * min(faults, 3.0)
+    return float(np.mean([at_command(v) for v in results])) + worse
 
 
 def _command_result(runs: list[Rollout], command: float, legs: range, rate: float) -> CommandResult:

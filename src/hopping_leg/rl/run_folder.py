@@ -42,7 +42,10 @@ class RunFolder:
             "minutes_budget": minutes,
             "versions": {k: v for k, v in versions(*_LIBRARIES).items() if k != "python"},
         }
-        self.config: dict[str, Any] = json.loads(json.dumps(config, default=_name))
+        named = json.dumps(
+            config, default=lambda f: getattr(f, "__qualname__", type(f).__qualname__)
+        )
+        self.config: dict[str, Any] = json.loads(named)
         """What the run was asked for, as JSON values."""
 
     def begin(self, *, new: bool) -> checkpoint.Tree | None:
@@ -60,11 +63,6 @@ class RunFolder:
             raise UsageError(f"The run in {self.path} is finished; it made {self.policy}.")
         found = checkpoint.list_checkpoints(self.checkpoints)
         return checkpoint.read_checkpoint(found[-1]) if found else None
-
-    def write_result(self, result: dict[str, Any]) -> None:
-        """Write ``result.json`` and the model card."""
-        write_json(self.path / "result.json", result)
-        write_atomically(self.path / "model_card.md", model_card(result).encode())
 
     def check_same(self) -> None:
         """Raise ``UsageError`` that names what else the run in the folder was asked for."""
@@ -105,10 +103,6 @@ def read_result(path: Path) -> dict[str, Any]:
     return parse_json(file.read_bytes(), str(file))
 
 
-def _name(function: object) -> str:
-    return str(getattr(function, "__qualname__", type(function).__qualname__))
-
-
 def model_card(result: dict[str, Any]) -> str:
     """Return the card of a training, as Markdown, from its result."""
     selected, task, name = result["selected"], result["options"]["task"], result["robot"]
@@ -123,6 +117,9 @@ def model_card(result: dict[str, Any]) -> str:
     chosen = (
         f"- Selection: the policy after {steps} steps ({minutes:.1f} min) of {tried} snapshots.\n"
     )
+    missed = missed_commands(selected["trials"])
+    more = "Train longer or from another seed\nbefore this policy goes to any other leg."
+    warning = f"\n**{missed[0]}** {more}\n" if missed else ""
     return f"""# Policy `{result["recipe"]}`, seed {result["seed"]}
 
 One network from joint measurements to joint torques, for {legs} {robot}
@@ -142,7 +139,7 @@ step {1000 * TIMESTEP:g} ms, the first 2 s of each trial dropped. These seeds ch
 | command m | median error mm | std mm | hops/s | flight % | skipped | body contact ticks\
  | lowest base m |
 |---|---|---|---|---|---|---|---|
-{"".join(map(_row, selected["trials"]))}{_warning(missed_commands(selected["trials"]))}"""
+{"".join(map(_row, selected["trials"]))}{warning}"""
 
 
 def _row(trial: dict[str, Any]) -> str:
@@ -168,11 +165,6 @@ def missed_commands(trials: list[dict[str, Any]]) -> tuple[str, ...]:
         if error is None or abs(error) > MISSED
     ]
     return (f"Commands missed in its own simulation: {', '.join(missed)}.",) if missed else ()
-
-
-def _warning(missed: tuple[str, ...]) -> str:
-    more = "Train longer or from another seed\nbefore this policy goes to any other leg."
-    return f"\n**{missed[0]}** {more}\n" if missed else ""
 
 
 def _mm(metres: float | None) -> str:

@@ -23,7 +23,7 @@ from stable_baselines3.sac.policies import SACPolicy
 from torch import nn
 
 from hopping_leg.arrays import Array, Array32, BoolArray, Stateful
-from hopping_leg.envs.task import HoppingTask, Step
+from hopping_leg.envs.task import HoppingTask
 from hopping_leg.rl.checkpoint import Tree
 from hopping_leg.rl.learner import NetworkConfig
 from hopping_leg.rl.onnx_export import Actor, DenseActor
@@ -62,20 +62,16 @@ class TaskVecEnv(Stateful, VecEnv):  # type: ignore[misc]
         """Step all legs; legs whose episode ended have begun the next."""
         step = self.task.step(self._action)
         done = step.terminated | step.truncated
-        infos = self._end_episodes(step, done) if done.any() else self._nothing
-        return self._observation(step.observation), step.reward, done, infos
-
-    def _end_episodes(self, step: Step, done: BoolArray) -> list[dict[str, Any]]:
-        assert step.final_observation is not None
-        assert step.final_privileged is not None
-        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        infos = [{} for _ in done] if done.any() else self._nothing
         for leg in np.flatnonzero(done):
+            assert step.final_observation is not None
+            assert step.final_privileged is not None
             final = step.final_observation[leg], step.final_privileged[leg]
             infos[leg] = {
                 "terminal_observation": np.concatenate(final),
                 "TimeLimit.truncated": bool(step.truncated[leg]),
             }
-        return infos
+        return self._observation(step.observation), step.reward, done, infos
 
     def _observation(self, seen: Array32) -> Array32:
         return np.concatenate([seen, self.task.privileged()], axis=1)

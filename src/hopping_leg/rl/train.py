@@ -14,6 +14,7 @@ from stable_baselines3.common.logger import configure
 from hopping_leg import errors, locks
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.envs import TaskLeg
+from hopping_leg.io import write_atomically, write_json
 from hopping_leg.rl import onnx_export, reach, run_folder
 from hopping_leg.rl.checkpoint import write_checkpoint
 from hopping_leg.rl.policy_evaluation import FINAL_SEEDS, Selection, calibrate, input_range
@@ -164,7 +165,9 @@ class Trainer:
             "history": self.selection.rows,
             "seconds": self.seconds | learner.seconds,
         }
-        self.folder.write_result(result)
+        write_json(self.folder.path / "result.json", result)
+        card = run_folder.model_card(result).encode()
+        write_atomically(self.folder.path / "model_card.md", card)
         Policy(content, "the selected policy", self.recipe.name).save(self.folder.policy)
         return Trained(self.folder.policy, minutes, steps)
 
@@ -216,19 +219,17 @@ class Trainer:
         write_checkpoint(self.folder.checkpoints, self.learner.num_timesteps, tree)
         self._saved = time.monotonic()
 
-    def _content(self) -> bytes:
-        """Return the deterministic policy as it stands, as a policy file."""
-        card = onnx_export.make_card(
-            self.robot, self.recipe.task, self.recipe.name,
-            seed=self.folder.config["seed"], steps=int(self.learner.num_timesteps),
-            versions=self.folder.config["versions"],
-        )  # fmt: skip
-        return onnx_export.build_policy(self.learner.network(), self.learner.task.observation, card)
-
     def _evaluate(self) -> None:
         steps = int(self.learner.num_timesteps)
         with self._timed("snapshots"):
-            row = self.selection.add(steps, self.elapsed / 60, self._content())
+            card = onnx_export.make_card(
+                self.robot, self.recipe.task, self.recipe.name,
+                seed=self.folder.config["seed"], steps=steps,
+                versions=self.folder.config["versions"],
+            )  # fmt: skip
+            learner = self.learner
+            content = onnx_export.build_policy(learner.network(), learner.task.observation, card)
+            row = self.selection.add(steps, self.elapsed / 60, content)
         logger = self.learner.logger
         logger.record("trial/score_m", row["score_m"])
         for trial in row["trials"]:

@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args, get_type_hints
 
 import msgspec
 
-from hopping_leg.controllers.user_controllers import load_user_object
+from hopping_leg.controllers.user_controllers import find_user_object
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes import fast, paper, rl, universal
@@ -47,7 +47,7 @@ def get_recipe(name: str) -> Recipe:
         if name not in RECIPES:
             raise UsageError(unknown_name("recipe", name, RECIPES))
         return RECIPES[name]
-    found = load_user_object(name)
+    _, found = find_user_object(name)
     recipe = found() if callable(found) else found
     if not isinstance(recipe, Recipe):
         raise UsageError(f"'{name}' is no recipe; name a Recipe, or a function that returns one.")
