@@ -7,7 +7,7 @@ Examples:
 """
 
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
@@ -62,7 +62,7 @@ def run(args: Urdf | Policy | Traces) -> None:
         from hopping_leg.controllers.registry import load_policy
 
         policy = load_policy(args.policy)
-        facts = {**asdict(policy.card), "digest": policy.digest, "inputs": policy.inputs}
+        facts = policy.contract() | {"digest": policy.digest}
         show_table(("entry", "value"), facts.items(), f"policy {policy.name}")
         save_json(args.json, facts)
         if args.out:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -13,13 +12,6 @@ from hopping_leg.errors import UsageError
 from hopping_leg.robot import Robot, command_limits
 
 Range = tuple[float, float]  # Lowest and highest, m
-
-
-class Commands(Protocol):
-    """A source of commanded heights."""
-
-    def at(self, elapsed: float) -> float:
-        """Return the height commanded at a time since the first hop, m."""
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ The file is self-contained: normalisation and torque scaling are inside the grap
 beside it for other runtimes. It runs through onnxruntime alone.
 """
 
+import contextlib
 import hashlib
 import importlib
 import json
@@ -18,11 +19,7 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.observation_history import (
-    AnyLeg,
-    ObservationHistory,
-    make_observation_history,
-)
+from hopping_leg.controllers.observation_history import AnyLeg, make_observation_history
 from hopping_leg.errors import PolicyError, UsageError
 from hopping_leg.io import Tree, parse_json, plain, read_dataclass, write_atomically, write_json
 from hopping_leg.robot.parameters import Robot
@@ -201,9 +198,20 @@ class Policy:
         """Whether it is for any leg, once it is told which."""
         self.scale = 1.0
         """Size of the leg that it is on, over that of the paper's, if it is for any leg."""
-        self._memory_size = _check_signature(self._session, self._layout, origin)
-        memory = {MEMORY: (self._memory_size,)} if self._memory_size else {}
-        self.seconds = measure_session(self._session, self._layout.shapes | memory, origin)
+        found = {i.name: tuple(i.shape[1:]) for i in self._session.get_inputs()}
+        outputs = [tuple(o.shape[1:]) for o in self._session.get_outputs()]
+        shape = found.pop(MEMORY, ())
+        if shape and not isinstance(shape[0], int):
+            raise PolicyError(f"{origin} has a memory of unknown size {shape}.")
+        shapes = self._layout.shapes
+        if found != shapes or outputs != ([(2,), shape] if shape else [(2,)]):
+            raise PolicyError(
+                f"{origin} takes {found} and gives {outputs}, but layout '{self._layout.name}'"
+                f" takes {shapes} and gives one array of two torques."
+            )
+        self._memory_size = shape[0] if shape else 0
+        memory = {MEMORY: shape} if shape else {}
+        self.seconds = measure_session(self._session, shapes | memory, origin)
         self.reset(0)
 
     @staticmethod
@@ -218,10 +226,16 @@ class Policy:
         except OSError as error:
             raise PolicyError(f"Cannot read policy file {path}: {error.strerror}.") from error
         if path.suffix != ".zip":
-            try:
-                return Policy(content, origin, path.stem)._checked(path.with_suffix(".json"))
-            except NoCardError:
-                pass
+            with contextlib.suppress(NoCardError):
+                policy, beside = Policy(content, origin, path.stem), path.with_suffix(".json")
+                told = parse_json(beside.read_bytes(), str(beside)) if beside.is_file() else {}
+                own = policy.contract().items() if _SUM in told else ()
+                if wrong := [name for name, value in own if told.get(name) != value]:
+                    raise PolicyError(
+                        f"{beside} is not the contract of {origin}: '{wrong[-1]}' differs; take"
+                        " both files from where they were written, or remove the contract."
+                    )
+                return policy
         converter = importlib.import_module(_CONVERTER)
         return Policy(converter.convert(content, path), origin, path.stem)
 
@@ -234,23 +248,6 @@ class Policy:
         """Return the card's contract, and the file's SHA-256 and memory, as JSON values."""
         memory = {"memory": self._memory_size} if self._memory_size else {}
         return {_SUM: hashlib.sha256(self.content).hexdigest(), **memory, **self.card.contract()}
-
-    def _checked(self, beside: Path) -> "Policy":
-        """Return the policy; PolicyError where a contract beside its file tells something else."""
-        told = parse_json(beside.read_bytes(), str(beside)) if beside.is_file() else {}
-        own = self.contract()
-        wrong = [name for name in own if told.get(name) != own[name]] if _SUM in told else []
-        if wrong:
-            raise PolicyError(
-                f"{beside} is not the contract of {self.origin}: '{wrong[-1]}' differs; take both"
-                " files from where they were written, or remove the contract."
-            )
-        return self
-
-    @property
-    def inputs(self) -> dict[str, tuple[int, ...]]:
-        """Names and shapes of the graph's inputs, without the number of legs."""
-        return self._layout.shapes
 
     @property
     def command_range(self) -> tuple[float, float]:
@@ -318,18 +315,3 @@ class Policy:
     def internals(self) -> dict[str, Array]:
         """Return nothing: a network has no state to show."""
         return {}
-
-
-def _check_signature(session: Any, layout: ObservationHistory, origin: str) -> int:  # noqa: ANN401
-    """Check a graph's inputs and outputs; return the entries of its memory, 0 if it has none."""
-    found = {i.name: tuple(i.shape[1:]) for i in session.get_inputs()}
-    outputs = [tuple(o.shape[1:]) for o in session.get_outputs()]
-    memory = found.pop(MEMORY, ())
-    if memory and not isinstance(memory[0], int):
-        raise PolicyError(f"{origin} has a memory of unknown size {memory}.")
-    if found != layout.shapes or outputs != ([(2,), memory] if memory else [(2,)]):
-        raise PolicyError(
-            f"{origin} takes {found} and gives {outputs}, but layout '{layout.name}' takes"
-            f" {layout.shapes} and gives one array of two torques."
-        )
-    return memory[0] if memory else 0

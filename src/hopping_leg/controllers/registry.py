@@ -7,7 +7,7 @@ from pathlib import Path
 
 from hopping_leg.controllers import energy_shaping, mpc, protocol, user_controllers
 from hopping_leg.controllers.energy_shaping.gains import load_gains
-from hopping_leg.controllers.policy import Card, Policy
+from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import PolicyError, UsageError, unknown_name
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot, shipped_robots
 from hopping_leg.sim import CONTROL_RATE
@@ -78,20 +78,15 @@ def robot_of(controllers: Sequence[str]) -> str:
         if name in shipped_policies() or (name.endswith(POLICY_FILES) and Path(name).is_file()):
             policy = load_policy(name)
             if not policy.for_any_leg:
-                return _robot_of_policy(policy.card, Path(name).with_name(ROBOT_FILE))
+                card, beside = policy.card, Path(name).with_name(ROBOT_FILE)
+                shipped = [card.robot] if card.robot in shipped_robots() else []
+                files = [str(beside)] if beside.is_file() else []
+                fit = (r for r in shipped + files if load_robot(r).has_digest(card.robot_digest))
+                return next(fit, shipped[0] if shipped else DEFAULT_ROBOT)
         if name.endswith(".toml") and Path(name).is_file():
             robot = load_gains(name).robot
             return robot if robot in shipped_robots() or Path(robot).is_file() else DEFAULT_ROBOT
     return DEFAULT_ROBOT
-
-
-def _robot_of_policy(card: Card, beside: Path) -> str:
-    """Return the robot of a card: of that name or the file beside, whichever has its numbers."""
-    shipped = [card.robot] if card.robot in shipped_robots() else []
-    for robot in [*shipped, *([str(beside)] if beside.is_file() else [])]:
-        if load_robot(robot).has_digest(card.robot_digest):
-            return robot
-    return shipped[0] if shipped else DEFAULT_ROBOT
 
 
 def load_controller(

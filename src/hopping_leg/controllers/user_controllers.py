@@ -94,7 +94,7 @@ def is_user_controller(name: str) -> bool:
 
 def load_user_controller(name: str, robot: Robot, rate: float) -> UserController:
     """Make a controller from ``FILE.py:CLASS`` or ``module:CLASS``, or raise ControllerError."""
-    module, kind = _find(name)
+    module, kind = find_user_object(name)
     with guarded(name, f"could not be made as {name.rpartition(':')[2]}(robot, rate={rate:g})"):
         controller = kind(robot, rate=rate)
     named = getattr(controller, "name", None)
@@ -109,35 +109,31 @@ def load_user_controller(name: str, robot: Robot, rate: float) -> UserController
     return UserController(controller, name, named, hashlib.sha256(content).hexdigest()[:16])
 
 
-def load_user_object(name: str) -> Any:  # noqa: ANN401
-    """Return what ``path/to/file.py:NAME`` or ``module:NAME`` is, or raise ControllerError."""
-    return _find(name)[1]
+def find_user_object(name: str) -> tuple[ModuleType, Any]:
+    """Return the module of ``path/to/file.py:NAME`` or ``module:NAME``, and what NAME is in it.
 
-
-def _find(name: str) -> tuple[ModuleType, Any]:
-    """Return module and object of a name; errors list the classes that the module defines."""
+    ControllerError lists the classes that the module defines.
+    """
     source, _, wanted = name.rpartition(":")
     if name.endswith(".py"):
         source, wanted = name, ""
     with guarded(source, "could not be imported"):
-        module = _load_file(source) if source.endswith(".py") else importlib.import_module(source)
+        if source.endswith(".py"):
+            # A name of its own keeps files of equal names apart; dataclasses look it up.
+            digest = hashlib.sha256(Path(source).read_bytes()).hexdigest()[:16]
+            spec = importlib.util.spec_from_file_location(f"hopping_leg_user_file_{digest}", source)
+            assert spec is not None
+            assert spec.loader is not None
+            sys.modules[spec.name] = module = importlib.util.module_from_spec(spec)
+            spec.loader.exec_module(module)
+        else:
+            module = importlib.import_module(source)
     if not hasattr(module, wanted):
         kinds = [kind for kind in vars(module).values() if isinstance(kind, type)]
         known = [kind.__name__ for kind in kinds if kind.__module__ == module.__name__]
         hint = "" if wanted else f" Write {source}:CLASS."
         raise ControllerError(f"In {source}: {unknown_name('class', wanted, known)}{hint}")
     return module, getattr(module, wanted)
-
-
-def _load_file(path: str) -> ModuleType:
-    # A name of its own keeps files of equal names apart; dataclasses look their module up by it.
-    digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16]
-    spec = importlib.util.spec_from_file_location(f"hopping_leg_user_file_{digest}", path)
-    assert spec is not None
-    assert spec.loader is not None
-    sys.modules[spec.name] = module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @contextlib.contextmanager

@@ -72,15 +72,17 @@ class EnergyShaping:
         self._end_touchdown(leg, command)
         self._end_push(leg, liftoff)
         target = kinematics.joint_angles(self.robot, np.stack([landing, 0 * landing], axis=-1))
-        posture, posture_rate = virtual_leg.retraction(
-            self._liftoff_q, target, self._clock, gains.retract_time
-        )
+        lasts = np.broadcast_to(gains.retract_time, self._clock.shape)[:, None]
+        share, way = self._clock[:, None] / lasts, target - self._liftoff_q
+        posture = self._liftoff_q + way * kinematics.smooth_step(share)
+        posture_rate = way * kinematics.smooth_step_rate(share) / lasts
         flying = self._stiffness * (posture - leg.q) + self._damping * (posture_rate - leg.qd)
         self._end_flight(leg, posture_rate, flying, command)
         self._estimate_height(leg)
         push = self._force(leg, command, liftoff, landing)
         side = -gains.kp_y * leg.y - gains.kd_y * leg.y_rate
-        pressing = virtual_leg.foot_force_torque(leg, push, side)
+        force = np.stack([push, side], axis=-1)  # on the ground, and forwards, N
+        pressing: Array = np.einsum("nij,ni->nj", leg.jacobian, force)
         share = np.where(self._phase == Phase.FLIGHT, 0.0, 1.0)
         pushes = self._phase == Phase.LIFTOFF
         self._share = np.where(pushes, self._pushing_share(leg, liftoff), share)

@@ -11,7 +11,7 @@ from enum import IntEnum
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.controllers.energy_shaping.gains import Gain, ShapingGains
+from hopping_leg.controllers.energy_shaping.gains import ShapingGains
 from hopping_leg.robot import Robot, kinematics
 
 
@@ -46,15 +46,6 @@ def view_leg(robot: Robot, q: Array, qd: Array) -> LegView:
     return LegView(q, qd, foot[:, 0], speed[:, 0], foot[:, 1], speed[:, 1], stand, jacobian)
 
 
-def foot_force_torque(leg: LegView, push: Array, side: Array) -> Array:
-    """Return the joint torques that press the foot with a force, N m, (n, 2).
-
-    A positive ``push`` presses the foot to the ground, N, (n,); ``side`` is the force forwards.
-    """
-    torque: Array = np.einsum("nij,ni->nj", leg.jacobian, np.stack([push, side], axis=-1))
-    return torque
-
-
 def leg_force(robot: Robot, leg: LegView, torque: Array) -> Array:
     """Return the force along the leg that joint torques, N m, (n, 2), press with at rest, N, (n,).
 
@@ -66,14 +57,6 @@ def leg_force(robot: Robot, leg: LegView, torque: Array) -> Array:
     bounded = np.where(determinant < 0, -1.0, 1.0) * np.maximum(np.abs(determinant), least)
     force: Array = (d * torque[:, 0] - c * torque[:, 1]) / bounded
     return force
-
-
-def retraction(start: Array, end: Array, elapsed: Array, duration: Gain) -> tuple[Array, Array]:
-    """Return where the joints should be and how fast, rad and rad/s, (n, 2); times are in s."""
-    lasts = np.broadcast_to(duration, elapsed.shape)[:, None]
-    share = elapsed[:, None] / lasts
-    rate = (end - start) * kinematics.smooth_step_rate(share) / lasts
-    return start + (end - start) * kinematics.smooth_step(share), rate
 
 
 PUSH_LIMIT = 0.4  # longest push, s: a leg without lift-off by then gives up and tries afresh
