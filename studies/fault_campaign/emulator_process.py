@@ -14,6 +14,7 @@ from typing import cast
 
 from hopping_leg.deploy.realtime import prefer_this_process, uninterrupted
 from hopping_leg.emulator.faults import Fault
+from hopping_leg.emulator.ports import PtyPort
 from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.emulator.server import EmulatorConfig, Server
 from hopping_leg.errors import UsageError
@@ -97,7 +98,7 @@ class EmulatorProcess(AbstractContextManager["EmulatorProcess"]):
 def _serve(start: EmulatorConfig, pipe: Connection) -> None:
     """Run in the process: serve the terminal until the pipe is closed."""
     try:
-        robot, port = start.build(), start.open()
+        robot, port = start.build(), PtyPort(start.link)
         robot.observer = log = WireLog()
     except Exception as error:
         pipe.send(str(error))

@@ -37,15 +37,6 @@ def test_what_was_recorded_comes_back_as_a_trace(path):
     assert Trace.load(path.with_suffix(".parquet")).header["robot"] == "legv2"
 
 
-def test_cut_anywhere_it_gives_all_whole_rows_before_the_cut(path):
-    content = path.read_bytes()
-    first = content.index(b"}}") + 2 + 4
-    size = 5 + 8 * len(COLUMNS) + 4
-    for cut in range(first, len(content)):
-        path.write_bytes(content[:cut])
-        assert len(FlightRecorderTail(path).rows()) == min((cut - first) // size, 5)
-
-
 def test_damage_ends_the_record_and_is_never_data(path):
     content = bytearray(path.read_bytes())
     content[content.index(b"}}") + 6 + 20] ^= 1

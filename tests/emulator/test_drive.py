@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode
-from hopping_leg.emulator.mode_machine import BETWEEN, STARTING_TIME, ModeMachine, Notice
+from hopping_leg.emulator.mode_machine import STARTING_TIME, ModeMachine, Notice
 from tests.emulator.bench import Bench, R
 
 
@@ -233,10 +233,3 @@ def test_fault_stays_until_stop_whatever_is_commanded(commands):
     machine.command(DriveMode.STOPPED, time, math.nan)
     run(machine, STEP, time)
     assert (machine.mode, machine.fault) == (DriveMode.STOPPED, 0)
-
-
-def test_modes_in_between_cannot_be_commanded():
-    machine, time = running()
-    for mode in BETWEEN:
-        machine.command(mode, time, math.nan)
-        assert run(machine, STEP, time)[1][-1] is DriveMode.POSITION

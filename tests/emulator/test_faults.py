@@ -94,12 +94,6 @@ def test_drive_faults_switch_off_and_stay(fault, code):
     assert ticks[-1][1].values[R.MODE] == DriveMode.POSITION
 
 
-def test_a_notice_changes_nothing_but_the_register():
-    _, ticks = hopping(Fault("limit_notice", at=0.03, value=100))
-    assert {replies[0].values[R.FAULT] for replies in ticks} == {0, 100}
-    assert {replies[0].values[R.MODE] for replies in ticks} == {DriveMode.POSITION}
-
-
 def test_power_loss_stops_the_drive_and_forgets_its_home():
     bench, ticks = hopping(Fault("power_loss", at=0.03, drive="hip"), seconds=0.035)
     modes = [replies[0].values[R.MODE] for replies in ticks]

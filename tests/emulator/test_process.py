@@ -135,15 +135,6 @@ def test_every_tick_is_answered_but_by_drives_whose_reply_is_lost(checksums, fau
     assert [tick for tick in seen if tick != (True, True)] == lost
 
 
-def test_a_run_is_exactly_repeatable():
-    def heights():
-        run = lockstep(robot="twin", seed=3)
-        replies(run, 60)
-        return run.truth
-
-    assert heights() == heights()
-
-
 def test_a_link_has_one_emulator(tmp_path):
     link = tmp_path / "leg"
     first = PtyPort(link)

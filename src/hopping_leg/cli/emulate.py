@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING
 
 from hopping_leg.cli.options import at_least, say, show_table
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode
-from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
+from hopping_leg.deploy.realtime import prefer_this_process, uninterrupted
 from hopping_leg.emulator.faults import KINDS, load_faults
 from hopping_leg.emulator.mode_machine import Notice
 from hopping_leg.robot import DEFAULT_ROBOT, JOINTS
@@ -68,36 +68,35 @@ class Emulate:
 def run(args: Emulate) -> None:
     """Serve the emulated robot until it is over, and tell what happens."""
     if args.kinds:
-        show_table(("kind", "what happens", "value", "unit", "lasts"), map(_kind_cells, KINDS))
+        rows, words = [], {"inf": "on", "nan": "so many replies"}
+        for name, kind in KINDS.items():
+            lasts = words.get(f"{kind.duration:g}", f"{kind.duration:g} s")
+            value = f"{kind.value:g}" if kind.unit else ""
+            rows.append((name, kind.text, value, kind.unit, lasts))
+        show_table(("kind", "what happens", "value", "unit", "lasts"), rows)
         return
     at_least(0, seed=args.seed)
+    from hopping_leg.emulator.ports import PtyPort
     from hopping_leg.emulator.server import EmulatorConfig, Server
 
     start = EmulatorConfig(
         robot=args.robot, pose=",".join(args.start_pose), configured=args.configured,
-        homed=args.homed, held=args.held, seed=args.seed, link=args.link,
+        homed=args.homed, held=args.held, seed=args.seed,
         faults=() if args.faults is None else load_faults(args.faults),
     )  # fmt: skip
-    robot, port = start.build(), start.open()
+    robot, port = start.build(), PtyPort(args.link)
     seconds = math.inf if args.seconds is None else args.seconds
     with contextlib.closing(port), contextlib.suppress(KeyboardInterrupt):
         ids = " and ".join(str(drive.id) for drive in robot.drives)
         say(f"Drives {ids} of {robot.robot.name} behind {port}")
         sys.stdout.flush()
-        if args.realtime and prefer_this_thread() is not None:
+        if args.realtime and prefer_this_process() is not None:
             say("Without real-time priority the drives may answer late under load.")
         server = Server(robot, port)
         server.on_turn = _Events(robot).tell
         with uninterrupted():
             server.run(lambda: robot.time >= seconds)
     say(f"The emulator ended after {robot.time:.1f} s.")
-
-
-def _kind_cells(name: str) -> tuple[str, ...]:
-    kind = KINDS[name]
-    words = {"inf": "on", "nan": "so many replies"}
-    lasts = words.get(f"{kind.duration:g}", f"{kind.duration:g} s")
-    return name, kind.text, f"{kind.value:g}" if kind.unit else "", kind.unit, lasts
 
 
 class _Events:

@@ -26,7 +26,7 @@ def _wait_readable(descriptor: int, until: float) -> bool:
 
 
 class LineTransport:
-    """Speaks to an fdcanusb over a descriptor that does not block; see ``Transport``.
+    """Speaks to an fdcanusb over a descriptor that does not block.
 
     Lines carry checksums from the start, or once the adapter asks for them. ``wait`` tells whether
     a descriptor has something to read until a time.
@@ -104,7 +104,9 @@ class Fdcanusb(LineTransport):
     def __init__(self, path: str, checksums: bool | None = None) -> None:
         self._lock = locks.DeviceLock(Path(path), HardwareError)
         self._port = opened(self._lock.close, lambda: serial.Serial(path, _BAUD, timeout=0))
-        wanted = not _is_fdcanusb(path) if checksums is None else checksums
+        device, ports = str(Path(path).resolve()), list_ports.comports()
+        real = any(p.device == device and (p.vid, p.pid) in FDCANUSB_IDS for p in ports)
+        wanted = not real if checksums is None else checksums
         super().__init__(self._port.fileno(), checksums=wanted)
 
     def close(self) -> None:
@@ -145,8 +147,3 @@ def opened(give_back: Callable[[], None], make: Callable[[], Any]) -> Any:  # no
         if isinstance(error, HardwareError):
             raise
         raise HardwareError(f"Cannot open the adapter: {error}.") from error
-
-
-def _is_fdcanusb(path: str) -> bool:
-    device = str(Path(path).resolve())
-    return any(p.device == device and (p.vid, p.pid) in FDCANUSB_IDS for p in list_ports.comports())

@@ -13,6 +13,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import command_schedule, joint_pd, protocol
 from hopping_leg.controllers.rollout import RolloutConfig
+from hopping_leg.deploy import keyboard
 from hopping_leg.deploy.drive_link import Pair
 from hopping_leg.deploy.standing_check import Squat, SquatFindings
 from hopping_leg.robot import Robot, kinematics
@@ -104,7 +105,7 @@ class MotionSequence:
     """
 
     controller: protocol.Controller
-    commands: command_schedule.Commands
+    commands: command_schedule.CommandSchedule | keyboard.LiveHeight
     poses: Poses
     limiter: protocol.SoftLimiter | None
     timing: SequenceTiming = field(default_factory=SequenceTiming)

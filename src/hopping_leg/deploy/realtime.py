@@ -52,11 +52,6 @@ _MCL_CURRENT, _MCL_FUTURE = 1, 2
 _SWITCH_SECONDS = 1e-4
 
 
-def prefer_this_thread() -> str | None:
-    """Give the calling thread real-time priority; return a notice where that is not permitted."""
-    return None if _schedule(0, "SCHED_FIFO", _PRIORITY) else _NOTICE
-
-
 def prefer_this_process() -> str | None:
     """Give all threads real-time priority; return a notice where that is not permitted.
 
@@ -68,16 +63,13 @@ def prefer_this_process() -> str | None:
 
 def _schedule_all(policy: str, priority: int) -> bool:
     threads = [int(task.name) for task in Path("/proc/self/task").glob("*")] or [0]
-    done = [_schedule(thread, policy, priority) for thread in threads]
-    return all(done)
-
-
-def _schedule(thread: int, policy: str, priority: int) -> bool:
-    try:
-        os.sched_setscheduler(thread, getattr(os, policy), os.sched_param(priority))
-    except (OSError, AttributeError) as error:  # macOS has none of it
-        return isinstance(error, ProcessLookupError)
-    return True
+    done = True
+    for thread in threads:
+        try:
+            os.sched_setscheduler(thread, getattr(os, policy), os.sched_param(priority))
+        except (OSError, AttributeError) as error:  # macOS has none of it
+            done &= isinstance(error, ProcessLookupError)
+    return done
 
 
 def lock_memory() -> str | None:

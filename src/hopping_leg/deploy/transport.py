@@ -8,12 +8,11 @@ cancelled, and are silenced by a line of noise.
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
 
 import can
 
 from hopping_leg import locks
-from hopping_leg.deploy.fdcanusb import Fdcanusb, opened
+from hopping_leg.deploy.fdcanusb import Fdcanusb, LineTransport, opened
 from hopping_leg.deploy.frames import Frame, padded
 from hopping_leg.errors import HardwareError, UsageError
 
@@ -23,22 +22,7 @@ _FORMS = (
 )
 
 
-class Transport(Protocol):
-    """Carries frames; what it cannot carry is lost, and ``trouble`` says why."""
-
-    trouble: str
-
-    def send(self, frames: Sequence[Frame]) -> None:
-        """Send frames now or never."""
-
-    def receive(self, until: float) -> list[Frame] | None:
-        """Return the frames of what arrives next; None if nothing does until a time, s."""
-
-    def close(self) -> None:
-        """Give the adapter back; another may be opened after it."""
-
-
-def open_transport(name: str) -> Transport:
+def open_transport(name: str) -> "Transport":
     """Open what a name means, or raise UsageError; HardwareError where it cannot be opened."""
     if "/" in name:
         if not Path(name).exists():
@@ -94,6 +78,10 @@ class PythonCan:
         """Leave the bus."""
         self._bus.shutdown()
         self._lock.release()
+
+
+Transport = LineTransport | PythonCan
+"""Carries frames; what it cannot carry is lost, and ``trouble`` says why."""
 
 
 def open_bus(interface: str, channel: str) -> can.BusABC:

@@ -119,19 +119,13 @@ def act(message: Message, drive: EmulatedDrive, time: float) -> None:
 def answer(message: Message, drive: EmulatedDrive) -> frames.Frame | None:
     """Return the answer of a drive that is meant; None if none is due."""
     reply = ReplyWriter()
-    _stream(message, drive, reply)
+    for s in message.streams:
+        if s.channel == settings.CHANNEL and s.type is SubframeType.STREAM_CLIENT_TO_SERVER:
+            drive.console.write(s.data)
+        elif s.channel == settings.CHANNEL and s.type is SubframeType.STREAM_CLIENT_POLL_SERVER:
+            reply.stream(s.channel, drive.console.poll(s.data[0]))
     _read(message, drive, reply)
     return message.frame.reply(drive.id, reply.data) if message.frame.wants_reply else None
-
-
-def _stream(message: Message, drive: EmulatedDrive, reply: ReplyWriter) -> None:
-    for s in message.streams:
-        if s.channel != settings.CHANNEL:
-            continue
-        if s.type is SubframeType.STREAM_CLIENT_TO_SERVER:
-            drive.console.write(s.data)
-        elif s.type is SubframeType.STREAM_CLIENT_POLL_SERVER:
-            reply.stream(s.channel, drive.console.poll(s.data[0]))
 
 
 def _read(message: Message, drive: EmulatedDrive, reply: ReplyWriter) -> None:

@@ -93,8 +93,11 @@ class LinePort(ABC):
             self._write(item.noise + b"\r\n")
             return
         line = self._protocol.line(item.frame.received)
-        if item.flip >= 0:
-            line = _flipped(line, 2 * len(item.frame.data), item.flip)
+        if item.flip >= 0:  # another digit in the payload: which and how
+            digits = 2 * len(item.frame.data)
+            at = line.index(b" ", line.index(b" ") + 1) + 1 + item.flip % digits
+            other = int(line[at : at + 1], 16) ^ (item.flip // digits % 15 + 1)
+            line = line[:at] + b"%X" % other + line[at + 1 :]
         self._write(line)
 
     def _write(self, data: bytes) -> None:
@@ -151,10 +154,3 @@ class PtyPort(LinePort):
         super().close()
         if self._lock is not None:
             self._lock.release()
-
-
-def _flipped(line: bytes, digits: int, flip: int) -> bytes:
-    """Return a line with another digit in its payload: ``flip`` says which and how."""
-    which, how = flip % digits, flip // digits % 15 + 1
-    at = line.index(b" ", line.index(b" ") + 1) + 1 + which
-    return line[:at] + b"%X" % (int(line[at : at + 1], 16) ^ how) + line[at + 1 :]

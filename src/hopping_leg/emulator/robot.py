@@ -128,25 +128,22 @@ class EmulatedRobot:
                 self.observer.record_mode(self.time, joint, drive.machine.mode)
 
 
-def _identity(seed: str) -> dict[int, int]:
-    """Return the registers of what a drive was made with; its serial number follows from a text."""
-    words = struct.unpack("<3I", hashlib.sha256(seed.encode()).digest()[:12])
-    return {
-        Register.MODEL_NUMBER: _MODEL,
-        Register.FIRMWARE_VERSION: _FIRMWARE,
-        Register.REGISTER_MAP_VERSION: REGISTER_MAP,
-        **{Register.SERIAL_NUMBER + k: word & 0x7FFFFFFF for k, word in enumerate(words)},
-    }
-
-
 def _drive(robot: Robot, joint: int, configured: bool) -> EmulatedDrive:
     servo = robot.hardware.servos[joint]
     motor = (robot.hip, robot.knee)[joint].motor
     changes: dict[str, float] = {"id.id": servo.id}
     if configured:
         changes |= {setting.name: setting.value for setting in required_settings(robot, joint)}
+    named = hashlib.sha256(f"{robot.name} {JOINTS[joint]}".encode()).digest()
+    words = struct.unpack("<3I", named[:12])  # of the serial number
+    identity = {
+        Register.MODEL_NUMBER: _MODEL,
+        Register.FIRMWARE_VERSION: _FIRMWARE,
+        Register.REGISTER_MAP_VERSION: REGISTER_MAP,
+        **{Register.SERIAL_NUMBER + k: word & 0x7FFFFFFF for k, word in enumerate(words)},
+    }
     return EmulatedDrive(
-        _identity(f"{robot.name} {JOINTS[joint]}"),
+        identity,
         settings.Settings(**changes),
         gear_ratio=motor.gear_ratio,
         brake=motor.peak_torque / motor.no_load_speed,

@@ -57,10 +57,6 @@ class EmulatorConfig:
             held=self.held, seed=self.seed, faults=self.faults,
         )  # fmt: skip
 
-    def open(self) -> PtyPort:
-        """Return the adapter; UsageError where the link is another emulator's, or no link."""
-        return PtyPort(self.link)
-
 
 def posture(robot: Robot, pose: str) -> Array:
     """Return the joint angles of a named or given pose, rad, (2,); UsageError for any other."""
