@@ -8,7 +8,6 @@ import pytest
 
 from hopping_leg.errors import UsageError
 from hopping_leg.identify import result, validation
-from hopping_leg.identify.report import write_fit_report
 from hopping_leg.identify.result import as_json, posterior_robots, save_robot, shown_errors
 from hopping_leg.io import write_json
 from hopping_leg.robot import check_physics, load_robot, load_tree
@@ -159,13 +158,3 @@ def test_draws_become_legs_whose_delay_is_their_latency_without_the_drives(tmp_p
     write_json(file, {**tree, "posterior": {"names": [], "samples": []}})
     with pytest.raises(UsageError, match="no whole draws"):
         posterior_robots(file, robot)
-
-
-def test_the_page_holds_every_part_needs_nothing_and_is_the_same_again():
-    page = write_fit_report(identified(), "hop identify")
-    assert write_fit_report(identified(), "hop identify") == page
-    page = page.decode()
-    for part in ("hip.friction", "Provenance", "swing"):
-        assert part in page
-    assert page.count("data:image/svg+xml") == 1
-    assert "http" not in page.replace("http://www.w3.org", "")

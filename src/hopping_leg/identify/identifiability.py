@@ -53,7 +53,13 @@ def identifiability(
     """
     freedom = max(len(residuals) / correlation_time(residuals) - len(vector), 1.0)
     variance = float(np.sum(np.square(residuals))) / freedom
-    covariance, blind = _covariance(jacobian, variance)
+    norm = np.linalg.norm(jacobian, axis=0)
+    safe = np.where(norm > 0, norm, 1.0)
+    _, singular, directions = np.linalg.svd(jacobian / safe, full_matrices=False)
+    weak = singular <= _SINGULAR * max(singular.max(initial=0.0), 1e-300)
+    root = directions.T * np.where(weak, 0.0, 1 / np.where(weak, 1.0, singular))
+    covariance = variance * (root @ root.T) / np.outer(safe, safe)
+    blind = (norm == 0) | (np.abs(directions[weak]) > 1e-3).any(axis=0)  # part of such a direction
     deviation = np.sqrt(np.diag(covariance))
     scale = np.where(deviation > 0, deviation, 1.0)
     correlation = covariance / np.outer(scale, scale)
@@ -88,19 +94,6 @@ def correlation_time(residuals: Array) -> float:
             break
         total += 2 * share
     return total
-
-
-def _covariance(jacobian: Array, variance: float) -> tuple[Array, Array]:
-    """Return the covariance and which parameters take part in a blind direction."""
-    norm = np.linalg.norm(jacobian, axis=0)
-    safe = np.where(norm > 0, norm, 1.0)
-    _, singular, directions = np.linalg.svd(jacobian / safe, full_matrices=False)
-    weak = singular <= _SINGULAR * max(singular.max(initial=0.0), 1e-300)
-    inverse = np.where(weak, 0.0, 1 / np.where(weak, 1.0, singular))
-    half = directions.T * inverse
-    covariance: Array = variance * (half @ half.T) / np.outer(safe, safe)
-    blind = (norm == 0) | (np.abs(directions[weak]) > 1e-3).any(axis=0)
-    return covariance, blind
 
 
 def _statements(

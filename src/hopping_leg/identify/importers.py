@@ -106,14 +106,11 @@ def read_log(table: pl.DataFrame, path: Path) -> tuple[pl.DataFrame, RecordingMe
     boom = metadata.boom
     derived = [_DERIVED[own](table, boom) for own in rig.derived if own in table.columns]
     renamed = table.select(present).with_columns(pl.int_range(pl.len()).alias("row"))
-    return _at_joints(renamed, rig).with_columns(derived), metadata
-
-
-def _at_joints(table: pl.DataFrame, rig: LogFormat) -> pl.DataFrame:
-    """Return the joints' columns with the robot's signs, and torques after the belt."""
+    # the joints' columns with the robot's signs, and torques after the belt
     signs = dict.fromkeys(itertools.chain(*PAIRS.values()), -1.0 if rig.mirrored else 1.0)
     for joint in rig.before_belt:
         ratio = getattr(load_robot(rig.metadata.robot), joint).belt_ratio
         for name in ("torque", "torque_command"):
             signs[PAIRS[name][JOINTS.index(joint)]] *= ratio
-    return table.with_columns(pl.col(c) * sign for c, sign in signs.items() if c in table.columns)
+    own_signs = [pl.col(c) * sign for c, sign in signs.items() if c in renamed.columns]
+    return renamed.with_columns(own_signs).with_columns(derived), metadata

@@ -169,18 +169,13 @@ def least_squares(
         still = np.zeros((len(loss.sizes), len(vector)))
         return np.concatenate([loss.weights(last)[:, None] * found, still])
 
-    def scanned(vector: Array) -> Array:
-        """Return the best of a vector and others that differ in a number searched in shares."""
-        for k in np.flatnonzero(parameters.shares):
+    while len(history) < options.rounds:
+        for k in np.flatnonzero(parameters.shares):  # the best of some that differ in this number
             near = vector[k] + _NEAR * parameters.start[k] / parameters.scale[k]
             vectors = np.tile(vector, (1 + len(_NEAR), 1))
             vectors[1:, k] = np.clip(near, low[k] + margin[k], high[k] - margin[k])
             costs = [np.sum(loss.levelled(r) ** 2) for r in counted(vectors)]
             vector = vectors[int(np.argmin(costs))]
-        return vector
-
-    while len(history) < options.rounds:
-        vector = scanned(vector)
         result = optimize.least_squares(
             values, vector, slopes, (low, high), x_scale="jac", max_nfev=options.evaluations
         )

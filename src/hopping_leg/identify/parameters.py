@@ -229,7 +229,12 @@ def choose(
         value = (start or {}).get(name, base.get(name))
         if math.isnan(value):
             raise UsageError(f"'{name}' has no value to start from; give one.")
-        low, high = (bounds or {}).get(name) or _widest_bounds(name, value)
+        joint, _, last = name.rpartition(".")
+        short = f"drive.{last}" if joint.startswith("drive") else last
+        known = _RANGES.get(name) or _RANGES.get(short)
+        widest = known or sorted((value / _FACTOR, value * _FACTOR))
+        widest = min(widest[0], value), max(widest[1], value)
+        low, high = (bounds or {}).get(name) or widest
         at_low = value == low == 0.0 or math.isclose(value, low, rel_tol=1e-12)
         scale = 0.02 * (high - low) if at_low else max(0.3 * abs(value), 1e-3 * (high - low))
         if name in STIFFNESS:
@@ -243,11 +248,3 @@ def _simulable(base: LegHypothesis, values: Mapping[str, float]) -> LegHypothesi
     found = base.replace(values)
     most = (stiffest(found.robot, joint, COARSE_TIMESTEP) for joint in JOINTS)
     return found.replace({n: m for n, m in zip(STIFFNESS, most, strict=True) if found.get(n) > m})
-
-
-def _widest_bounds(name: str, value: float) -> tuple[float, float]:
-    last = name.rsplit(".", 1)[-1]
-    short = f"drive.{last}" if name.startswith("drive.") else last
-    known = _RANGES.get(name) or _RANGES.get(short)
-    low, high = known or sorted((value / _FACTOR, value * _FACTOR))
-    return min(low, value), max(high, value)

@@ -112,7 +112,11 @@ def make_plan(
     if all(name.startswith("+") for name in names):
         names = [*_names(recordings, gains), *names]
     names = [name.removeprefix("+") for name in names]
-    start = LegHypothesis(_without_reality(robot, names)).replace(_start(recordings, gains))
+    # Of [reality] the transmission of a joint stays of which a number is fitted.
+    fitted = [joint for joint in JOINTS if any(f"reality.{joint}." in name for name in names)]
+    kept = {joint: getattr(robot.reality.in_training, joint) for joint in fitted}
+    bare = replace(robot, reality=replace(NO_MISMATCH, **kept))
+    start = LegHypothesis(bare).replace(_start(recordings, gains))
     for joint, name in zip(JOINTS, STIFFNESS, strict=True):
         if (limit := f"drive.{joint}.torque_limit") in names:
             start = start.replace({limit: getattr(robot, joint).torque_limit})
@@ -141,13 +145,6 @@ def pass_names(rigs: Sequence[recording_format.Rig]) -> tuple[list[str], list[st
     rail = _RAIL_PARAMETERS if "rail" in rigs else []
     solver = [] if set(rigs) == {"fixed-base"} else _SOLVER_PARAMETERS
     return _JOINT_PARAMETERS + rail, _INERTIAS + solver
-
-
-def _without_reality(robot: Robot, names: Sequence[str]) -> Robot:
-    """Return a robot without [reality], but for the transmission of a joint whose is fitted."""
-    fitted = (joint for joint in JOINTS if any(f"reality.{joint}." in name for name in names))
-    kept = {joint: getattr(robot.reality.in_training, joint) for joint in fitted}
-    return replace(robot, reality=replace(NO_MISMATCH, **kept))
 
 
 def _names(recordings: Sequence[Recording], gains: list[str]) -> list[str]:

@@ -24,15 +24,24 @@ def write_fit_report(identified: Identified, command: str = "", threads: int = 0
     """Return the report as HTML, with the command that made it; threads simulate what is drawn."""
     candidates = (identified.start, identified.hypothesis)
     drawn = overlays(identified.held, candidates, threads)
+    known = [(o.simulated["position"][-1], o.measured["position"]) for o in drawn]
+    errors = [float(np.nanmean(np.square(found - true))) for found, true in known]
+    worst = sorted(sorted(range(len(drawn)), key=errors.__getitem__, reverse=True)[:_MOST])
+    rigs = ", ".join(dict.fromkeys(r.metadata.rig for r in (*identified.fit, *identified.held)))
+    fit, held = (sum(r.duration for r in part) for part in (identified.fit, identified.held))
+    subtitle = (
+        f"{result.warning(identified)} {identified.start.robot.name} on {rigs}; {fit:.0f} s fitted,"
+        f" {held:.0f} s held out to judge ({identified.split}); search: {identified.plan.search}"
+    )
     page = page_template("hopping_leg.identify", "report.html.j2").render(
         title=f"{identified.robot.name} identified",
-        subtitle=_subtitle(identified),
+        subtitle=subtitle.strip(),
         command=command,
         split=identified.split,
         quality=_table(result.ERRORS, result.shown_errors(identified)),
         parameters=_table(result.PARAMETERS, result.shown_parameters(identified)),
         statements=identified.identifiability.statements,
-        fits=[_fit(overlay) for overlay in _worst(drawn)],
+        fits=[_fit(overlay) for overlay in map(drawn.__getitem__, worst)],
         left_out=max(0, len(drawn) - _MOST),
         provenance=result.provenance(identified),
     )
@@ -41,14 +50,6 @@ def write_fit_report(identified: Identified, command: str = "", threads: int = 0
 
 def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> Markup:
     return table([Column(text, itemgetter(n)) for n, text in enumerate(headings)], rows)
-
-
-def _worst(drawn: list[Overlay]) -> list[Overlay]:
-    """Return the recordings that fit worst, in their order."""
-    known = [(o.simulated["position"][-1], o.measured["position"]) for o in drawn]
-    errors = [float(np.nanmean(np.square(found - true))) for found, true in known]
-    ranked = sorted(range(len(drawn)), key=lambda index: errors[index], reverse=True)
-    return [drawn[index] for index in sorted(ranked[:_MOST])]
 
 
 def _fit(overlay: Overlay) -> dict[str, str]:
@@ -60,15 +61,6 @@ def _fit(overlay: Overlay) -> dict[str, str]:
         "caption": f"{overlay.recording.metadata.source}; simulated {how}.",
         "source": svg_uri(draw_overlay(overlay)),
     }
-
-
-def _subtitle(identified: Identified) -> str:
-    rigs = ", ".join(dict.fromkeys(r.metadata.rig for r in (*identified.fit, *identified.held)))
-    fit, held = (sum(r.duration for r in part) for part in (identified.fit, identified.held))
-    return (
-        f"{result.warning(identified)} {identified.start.robot.name} on {rigs}; {fit:.0f} s fitted,"
-        f" {held:.0f} s held out to judge ({identified.split}); search: {identified.plan.search}"
-    ).strip()
 
 
 @styled
