@@ -89,7 +89,13 @@ class FlightRecorderTail:
         for kind, data, end in _frames(content, at):
             at = end
             if kind == HEADER and not self.columns:
-                self._read_header(data)
+                first = parse_json(data, f"{self.path}: the header", errors.TraceError)
+                names: Any = first.get("columns")
+                header: Any = first.get("header")
+                named = isinstance(names, list) and names and all(isinstance(n, str) for n in names)
+                if not (named and len({*names}) == len(names) and isinstance(header, dict)):
+                    raise errors.TraceError(f"{self.path} is damaged: its header names no columns.")
+                self.columns, self.header = tuple(names), header
             elif kind == ROW and len(data) == 8 * len(self.columns) > 0:
                 found.append(data)
             elif kind == EVENT and self.columns:
@@ -100,15 +106,6 @@ class FlightRecorderTail:
                 )
         self._rest = content[at:]
         return np.frombuffer(b"".join(found), "<f8").reshape(len(found), len(self.columns))
-
-    def _read_header(self, data: bytes) -> None:
-        first = parse_json(data, f"{self.path}: the header", errors.TraceError)
-        names: Any = first.get("columns")
-        header: Any = first.get("header")
-        named = isinstance(names, list) and names and all(isinstance(n, str) for n in names)
-        if not (named and len({*names}) == len(names) and isinstance(header, dict)):
-            raise errors.TraceError(f"{self.path} is damaged: its header names no columns.")
-        self.columns, self.header = tuple(names), header
 
     def close(self) -> None:
         """Close the file."""

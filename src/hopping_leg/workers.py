@@ -10,14 +10,13 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from typing import Any, ParamSpec, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import HoppingLegError, UsageError
 
-P = ParamSpec("P")
 R = TypeVar("R")
 T = TypeVar("T")
 
@@ -41,10 +40,6 @@ class ProcessWorkers:
         self._pool = ProcessPoolExecutor(self.count, context, _watch, (ended,))
         return self
 
-    def submit(self, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> Future[R]:
-        """Begin a call in a process of its own, as soon as one is free."""
-        return self._pool.submit(function, *args, **kwargs)
-
     def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> Iterator[R]:
         """Call a function once per tuple of arguments; yield what it returns, in their order.
 
@@ -54,7 +49,7 @@ class ProcessWorkers:
         if self.count == 1:
             yield from (function(*values) for values in arguments)
             return
-        begun = (self.submit(function, *values) for values in arguments)
+        begun = (self._pool.submit(function, *values) for values in arguments)
         try:
             yield from _in_order(begun, Future.result, self.count)
         except BrokenProcessPool as error:
@@ -99,7 +94,10 @@ class RayWorkers:
         self._ray = ray
         if not ray.is_initialized():
             try:
-                _knock(address)
+                # At once where nothing answers; Ray itself would try for minutes.
+                host, _, port = (address or "").removeprefix("ray://").rpartition(":")
+                if host and port.isdigit():
+                    socket.create_connection((host, int(port)), _PATIENCE).close()
                 ray.init(address=address or "local", log_to_driver=False)
             except (OSError, ValueError, RuntimeError) as error:
                 raise UsageError(
@@ -133,13 +131,6 @@ def _in_order(begun: Iterator[T], result: Callable[[T], R], count: int) -> Itera
         if len(waiting) == 2 * count:
             yield result(waiting.popleft())
     yield from map(result, waiting)
-
-
-def _knock(address: str | None) -> None:
-    """Fail at once with an OSError where nothing answers; Ray itself would try for minutes."""
-    host, _, port = (address or "").removeprefix("ray://").rpartition(":")
-    if host and port.isdigit():
-        socket.create_connection((host, int(port)), _PATIENCE).close()
 
 
 Workers = ProcessWorkers | RayWorkers

@@ -16,7 +16,6 @@ from hopping_leg.controllers.joint_pd import JointGains
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.evaluate.trials import load_run
 from hopping_leg.hop_detection import find_hops, trace_hops
-from hopping_leg.identify.excitation import load_excitation
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.robot import DEFAULT_ROBOT
 from hopping_leg.trace import Trace
@@ -202,19 +201,3 @@ def test_a_recording_holds_what_was_played_and_measured(tmp_path, rig):
     np.testing.assert_array_equal(recording.array("velocity_command"), 0.0)
     steps = recording.array("position") / [6.4e-5, 3.2e-5]
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("words", "rig", "samples"),
-    [
-        (["fixed-base"], "fixed-base", 48000),
-        (["moving-base", "--duration", "30"], "rail", 6000),
-        (["multisine", "--duration", "20", "--rate", "100"], "fixed-base", 2000),
-    ],
-)
-def test_each_template_is_written_and_summed_up(tmp_path, capsys, words, rig, samples):
-    out = tmp_path / "excitation.parquet"
-    assert main(["record", *words, "--out", str(out)]) == 0
-    excitation = load_excitation(out)
-    assert (excitation.rig, len(excitation)) == (rig, samples)
-    assert "torque, N m" in capsys.readouterr().out

@@ -89,15 +89,6 @@ def test_numbers_are_given_with_commas_or_spaces(given_as):
     assert found == Lists(("run/x,y",), (0.2, 0.3), (0.2, 0.3), ("hip.friction=0,1",))
 
 
-@pytest.mark.parametrize("verb", cli.VERBS)
-def test_every_verb_has_help(capsys, verb):
-    with pytest.raises(SystemExit, match="0"):
-        main([verb, "--help"])
-    shown = capsys.readouterr().out
-    assert shown.startswith(f"usage: hop {verb}")
-    assert "Examples:" in shown
-
-
 @pytest.mark.parametrize("name", shipped_robots())
 def test_show_gives_every_number_with_unit_and_source(capsys, name):
     assert main(["robots", "show", name]) == 0

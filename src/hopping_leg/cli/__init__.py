@@ -104,7 +104,9 @@ _EXTRAS = {
 
 def _dispatch(words: list[str]) -> int:
     if not words or words[0] in ("-h", "--help", "help"):
-        print(overview())
+        print("A one-legged robot hops to commanded heights: simulate, train, evaluate, deploy.\n")
+        print("\n".join(f"  {verb:<10}  {line}" for verb, line in VERBS.items()))
+        print("\n`hop VERB --help` explains a verb, `hop --version` says which version this is.")
         return 0
     verb, rest = words[0], words[1:]
     if verb in ("--version", "-V", "version"):
@@ -133,18 +135,8 @@ def read_options(options: Any, program: str, about: str | None, words: Sequence[
     Lists may be given with commas or spaces. SystemExit ends the program after it has printed the
     help that was asked for, or what is wrong with the words.
     """
-    apart = [part for word in words for part in _parts(word)]
+    apart = list[str]()
+    for word in words:
+        listed = _LIST.fullmatch(word) and not os.path.exists(word)  # noqa: PTH110
+        apart += word.split(",") if listed else [word]
     return tyro.cli(options, prog=program, description=about, args=apart, config=_CONFIG)
-
-
-def _parts(word: str) -> list[str]:
-    return word.split(",") if _LIST.fullmatch(word) and not os.path.exists(word) else [word]  # noqa: PTH110
-
-
-def overview() -> str:
-    """Return what ``hop --help`` prints."""
-    verbs = "\n".join(f"  {verb:<10}  {line}" for verb, line in VERBS.items())
-    return (
-        "A one-legged robot hops to commanded heights: simulate, train, evaluate, deploy.\n\n"
-        f"{verbs}\n\n`hop VERB --help` explains a verb, `hop --version` says which version this is."
-    )

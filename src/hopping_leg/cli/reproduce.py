@@ -68,7 +68,10 @@ def run(args: Reproduce) -> None:
     options.at_least(0, seed=args.seed)
     twin, believed = drawn.robot, str(drawn.tree["extends"])
     with hold_folder(folder, UsageError):
-        _check_same(folder, {"seed": args.seed, "quick": args.quick})
+        file, asked_for = folder / "options.json", {"seed": args.seed, "quick": args.quick}
+        if file.exists() and io.parse_json(file.read_bytes(), str(file)) != asked_for:
+            raise UsageError(f"{folder} holds a run with other options; give another --out.")
+        io.write_json(file, asked_for)
         recordings = list(_record(twin, believed, folder))
         identified = _identify(recordings, believed, folder, quick=args.quick)
         told: dict[str, tuple[str | Path, str]] = {
@@ -122,14 +125,6 @@ def _outcome(transfer: "EvaluationRun") -> list[str]:
             f" identified simulation, {rms['legv2']:.0f} in the CAD's (studies/real_hops)."
         )
     return said
-
-
-def _check_same(folder: Path, asked: dict[str, object]) -> None:
-    """Refuse a folder that holds a run of other options."""
-    file = folder / "options.json"
-    if file.exists() and io.parse_json(file.read_bytes(), str(file)) != asked:
-        raise UsageError(f"{folder} holds a run with other options; give another --out.")
-    io.write_json(file, asked)
 
 
 def _record(twin: Robot, believed: str, folder: Path) -> "Iterator[Recording]":

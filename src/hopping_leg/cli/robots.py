@@ -95,7 +95,15 @@ def run(
     elif isinstance(args, Import):
         _import(args)
     elif isinstance(args, Draw):
-        _draw(args)
+        from hopping_leg.sim.any_leg import draw_leg
+        from hopping_leg.sim.randomization import draw_twin
+
+        at_least(1, count=args.count)
+        at_least(0, seed=args.seed)
+        draw = draw_twin if args.kind == "twins" else draw_leg
+        for drawn in map(draw, range(args.seed, args.seed + args.count)):
+            drawn.save(args.out / f"{drawn.robot.name}.toml")
+        print(f"Wrote {args.count} robot files to {args.out}.")
     else:
         tree = robot_files.load_tree(args.robot)
         robot = robot_files.robot_from_tree(tree, args.robot)
@@ -108,19 +116,6 @@ def run(
             build_model(robot)
             print(f"{args.robot} is a valid robot: {robot.name} ({_summary(robot)}).")
         say(*(f"But {doubt}" for doubt in robot_files.doubts(args.robot)))
-
-
-def _draw(args: Draw) -> None:
-    from hopping_leg.sim.any_leg import draw_leg
-    from hopping_leg.sim.randomization import draw_twin
-
-    at_least(1, count=args.count)
-    at_least(0, seed=args.seed)
-    draw = draw_twin if args.kind == "twins" else draw_leg
-    for seed in range(args.seed, args.seed + args.count):
-        drawn = draw(seed)
-        drawn.save(args.out / f"{drawn.robot.name}.toml")
-    print(f"Wrote {args.count} robot files to {args.out}.")
 
 
 def _import(args: Import) -> None:

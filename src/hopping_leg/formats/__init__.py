@@ -127,7 +127,14 @@ def read_bag(path: Path, origin: str) -> pl.DataFrame:
     """
     try:
         states, numbers = _messages(path)
-        table = _join(states, numbers) if states else None
+        table = None
+        if states:  # the measured joints with what was logged beside them
+            measured = max(states, key=lambda topic: (topic.endswith(STATES), len(states[topic])))
+            table = _table(states.pop(measured))
+            for rows in [*states.values(), *numbers.values()]:
+                table = table.join_asof(_table(rows).drop(_STAMP, strict=False), on=_LOGGED)
+            stamp = pl.col(_STAMP) - pl.col(_STAMP).first() // 10**9 * 10**9
+            table = table.select((stamp / 1e9).alias("time_s"), pl.exclude(_LOGGED, _STAMP))
     except ModuleNotFoundError:
         raise
     except Exception as error:  # readers raise many unrelated types where a file is damaged
@@ -169,16 +176,6 @@ def _messages(path: Path) -> tuple[Rows, Rows]:
                         row[f"{name}/{joint}.{quantity}"] = float(value)
             states.setdefault(name, []).append(row)
     return states, numbers
-
-
-def _join(states: Rows, numbers: Rows) -> pl.DataFrame:
-    """Return the measured joints with what was logged beside them."""
-    measured = max(states, key=lambda topic: (topic.endswith(STATES), len(states[topic])))
-    table = _table(states.pop(measured))
-    for rows in [*states.values(), *numbers.values()]:
-        table = table.join_asof(_table(rows).drop(_STAMP, strict=False), on=_LOGGED)
-    stamp = pl.col(_STAMP) - pl.col(_STAMP).first() // 10**9 * 10**9
-    return table.select((stamp / 1e9).alias("time_s"), pl.exclude(_LOGGED, _STAMP))
 
 
 def _table(rows: list[Tree]) -> pl.DataFrame:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hopping_leg.controllers import command_schedule, protocol, registry
+from hopping_leg.controllers import command_schedule, registry
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.errors import UsageError
@@ -97,7 +97,10 @@ class LiveSimulation:
         rows[3:5] = legs.q.T
         rows[7] = legs.foot_clearance()
         seen = self._plant.sense(rows[0])
-        torques = [c.act(_of_leg(seen, leg)) for leg, c in enumerate(self._controllers)]
+        torques = [
+            controller.act(Measurement(*(part[leg : leg + 1] for part in vars(seen).values())))
+            for leg, controller in enumerate(self._controllers)
+        ]
         rows[5:7] = self._plant.drive(np.concatenate(torques)).T
         for leg, track in enumerate(self.tracks):
             if np.abs(legs.qd[leg]).max() < _IMPOSSIBLE:
@@ -132,7 +135,14 @@ class LiveSimulation:
         controllers = [registry.load_controller(name, robot) for name in names]
         policies = (c for c in controllers if isinstance(c, Policy))
         self.notices += filter(None, (p.stranger(robot, p.name) for p in policies))
-        self.valid = _shared_range(controllers, robot)
+        ranges = [command_schedule.command_range(controller, robot) for controller in controllers]
+        low, high = max(low for low, _ in ranges), min(high for _, high in ranges)
+        if not low < high:
+            both = " and ".join(c.name for c in controllers)
+            raise UsageError(
+                f"{both} share no height that both can be asked for; show them in turn."
+            )
+        self.valid = low, high
         if robot != self.robot:
             self.settings = default_settings(robot)
         self.robot, self.robot_name, self.names = robot, robot_name, names
@@ -161,17 +171,3 @@ class LiveSimulation:
     def _restart(self, legs: slice) -> None:
         q, qd = self._legs.q[legs], self._legs.qd[legs]
         self._plant.channel.restart(legs, q, qd, np.full(len(q), self.height))
-
-
-def _of_leg(seen: Measurement, leg: int) -> Measurement:
-    part = slice(leg, leg + 1)
-    return Measurement(seen.q[part], seen.qd[part], seen.command[part], seen.age[part])
-
-
-def _shared_range(controllers: list[protocol.Controller], robot: Robot) -> command_schedule.Range:
-    ranges = [command_schedule.command_range(controller, robot) for controller in controllers]
-    low, high = max(low for low, _ in ranges), min(high for _, high in ranges)
-    if not low < high:
-        names = " and ".join(controller.name for controller in controllers)
-        raise UsageError(f"{names} share no height that both can be asked for; show them in turn.")
-    return low, high

@@ -117,18 +117,6 @@ def _put(bar: viser.BoxHandle, height: float) -> None:
         bar.visible = known
 
 
-def _add_floor(scene: viser.SceneApi) -> None:
-    """Lay out a floor with lines every 0.1 m."""
-    (x, y), thick = _FLOOR, 0.02
-    slab, under = (2 * x, 2 * y, thick), (0.0, 0.0, -thick / 2)
-    scene.add_box("/floor/slab", (226, 230, 235), slab, position=under, **_PLAIN)
-    above = 0.0005  # the slab, m
-    lines = [((at, -y, above), (at, y, above)) for at in np.arange(-x, x + 0.05, 0.1)]
-    lines += [((-x, at, above), (x, at, above)) for at in np.arange(-y, y + 0.05, 0.1)]
-    look: Any = {"thickness": 1.0, "thickness_units": "screen"}
-    scene.add_line_segments("/floor/lines", np.array(lines), (196, 202, 210), **look)
-
-
 class Scene:
     """Draws tracks, their curves in a panel of the page; call ``show`` for every picture."""
 
@@ -143,7 +131,14 @@ class Scene:
         scene.configure_default_lights(enabled=False)
         scene.add_light_ambient("/light/all", intensity=1.6)
         scene.add_light_directional("/light/sun", intensity=2.6, position=(-0.5, -1.2, 1.6))
-        _add_floor(scene)
+        (x, y), thick = _FLOOR, 0.02
+        slab, under = (2 * x, 2 * y, thick), (0.0, 0.0, -thick / 2)
+        scene.add_box("/floor/slab", (226, 230, 235), slab, position=under, **_PLAIN)
+        above = 0.0005  # the slab, m
+        lines = [((at, -y, above), (at, y, above)) for at in np.arange(-x, x + 0.05, 0.1)]
+        lines += [((-x, at, above), (x, at, above)) for at in np.arange(-y, y + 0.05, 0.1)]
+        look: Any = {"thickness": 1.0, "thickness_units": "screen"}
+        scene.add_line_segments("/floor/lines", np.array(lines), (196, 202, 210), **look)
 
     def show(self, tracks: list[Track], now: float, turn: int) -> None:
         """Draw the legs at a time, s, and what has its turn: one of three plots, or the marks.
