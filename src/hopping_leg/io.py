@@ -86,8 +86,12 @@ def one_line(value: object, most: int = 120) -> str:
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401
-    """Return a value as JSON holds it: lists for tuples, null for NaN and infinity."""
-    return msgspec.json.decode(msgspec.json.encode(value, enc_hook=lambda number: number.item()))
+    """Return a value with lists for tuples and null for numbers that JSON does not know (NaN)."""
+    if isinstance(value, dict):
+        return {key: plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def safe_file_name(text: str) -> str:

@@ -191,11 +191,12 @@ BOOM = {"boom": Boom(1e9, 0.0, 0.3, 0.8, 0.6, -4.0, 0.0, 0.5, 1.0)}
     ("name", "reality", "fixed_base", "count", "timestep"),
     [
         ("legv2", {}, False, 32, 5e-4),
-        ("legv2-paper", {}, False, 32, 1.25e-4),
+        ("legv2-paper", {}, False, 32, 5e-4),
         ("legv2", {}, True, 16, 5e-4),
-        ("legv2", ELASTIC, False, 64, 5e-4),
+        ("legv2", ELASTIC, False, 16, 5e-4),
         ("legv2", ELASTIC, True, 16, 5e-4),
         ("legv2", BOOM, False, 16, 5e-4),
+        pytest.param("legv2", {}, False, 256, 1.25e-4, marks=pytest.mark.slow),
     ],
 )
 def test_the_stepper_is_mujoco_for_legs_of_any_kind(name, reality, fixed_base, count, timestep):

@@ -117,8 +117,9 @@ def keep(args: Evaluate, judged: "EvaluationRun", notes: Sequence[str] = ()) -> 
         numbers, traces = numbers or args.out / "evaluation.json", traces or args.out / "traces"
         report = args.out / "report.html"
     options.save_json(numbers, evaluation.to_json())
-    for run in judged.runs if traces else ():
-        run.trace.save(traces / run.file_name)
+    if traces:
+        for run in judged.runs:
+            run.trace.save(traces / run.file_name)
     if report:
         io.write_atomically(report, write_report(replace(judged, evaluation=evaluation)))
     return [numbers, report, traces]

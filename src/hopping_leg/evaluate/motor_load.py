@@ -57,6 +57,10 @@ class MotorLoad:
     """Times a joint touched a mechanical stop; None where the simulation does not tell it."""
 
 
+UNKNOWN = MotorLoad(**dict.fromkeys(MotorLoad.__dataclass_fields__, np.nan))  # type: ignore[arg-type]
+"""The load of a leg that nothing is known of."""
+
+
 def motor_load(parts: Sequence[Trace], robot: Robot) -> MotorLoad:
     """Measure some stretches of runs together, each in one piece."""
     ends = np.cumsum([len(part.table) for part in parts])
@@ -95,11 +99,6 @@ def motor_load(parts: Sequence[Trace], robot: Robot) -> MotorLoad:
         bus_voltage_rise_v=float(np.sqrt(start**2 + 2 * stored / capacitance) - start),
         stop_contacts=None if np.isnan(rms).any() else sum(events(touch > 0) for touch in stops),
     )
-
-
-def unknown() -> MotorLoad:
-    """Return the load of a leg that nothing is known of."""
-    return MotorLoad(**dict.fromkeys(MotorLoad.__dataclass_fields__, np.nan))  # type: ignore[arg-type]
 
 
 def events(happens: BoolArray) -> int:

@@ -10,7 +10,7 @@ import polars as pl
 
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate import metrics, statistics
-from hopping_leg.evaluate.motor_load import MotorLoad, motor_load, unknown
+from hopping_leg.evaluate.motor_load import UNKNOWN, MotorLoad, motor_load
 from hopping_leg.evaluate.prediction import Prediction
 from hopping_leg.evaluate.trials import Run
 from hopping_leg.io import plain
@@ -203,7 +203,7 @@ def summarise(
 ) -> Summary:
     """Pool all windows of one controller at one command; the seed is of the bootstrap."""
     parts = [w.part for w in windows]
-    load = motor_load(parts, robot) if robot else unknown()
+    load = motor_load(parts, robot) if robot else UNKNOWN
     apex, errors = metrics.pooled_apexes(windows), metrics.errors_of(windows)
     every = np.concatenate(errors)
     low, high = statistics.median_interval(errors, seed)

@@ -220,17 +220,16 @@ class Trainer:
         self._saved = time.monotonic()
 
     def _evaluate(self) -> None:
-        steps = int(self.learner.num_timesteps)
+        learner, steps = self.learner, int(self.learner.num_timesteps)
         with self._timed("snapshots"):
             card = onnx_export.make_card(
                 self.robot, self.recipe.task, self.recipe.name,
                 seed=self.folder.config["seed"], steps=steps,
                 versions=self.folder.config["versions"],
             )  # fmt: skip
-            learner = self.learner
             content = onnx_export.build_policy(learner.network(), learner.task.observation, card)
             row = self.selection.add(steps, self.elapsed / 60, content)
-        logger = self.learner.logger
+        logger = learner.logger
         logger.record("trial/score_m", row["score_m"])
         for trial in row["trials"]:
             at = f"trial/{trial['command_m']:.2f}"
