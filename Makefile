@@ -46,7 +46,7 @@ types: $(STAMP)
 	$(BIN)/mypy
 docs: $(STAMP)
 	$(BIN)/python docs/render.py --check
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	$(BIN)/python docs/make_site.py
 wheel: $(STAMP)
 	$(BIN)/pytest -q tests/test_package.py
 	PYTHON=$(PYTHON) .ci/wheel.sh

@@ -19,8 +19,11 @@ def run(*words):
 
 
 @pytest.mark.slow
-def test_the_site_builds_without_a_dead_link_or_a_page_that_nothing_leads_to(tmp_path):
-    run("-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path))
+def test_the_site_builds_without_a_dead_link(tmp_path):
+    run(str(DOCS / "make_site.py"), str(tmp_path / "site"))
+    assert (tmp_path / "site" / "api" / "hopping_leg.trace" / "index.html").is_file()
+    told = (DOCS / "zensical.toml").read_text(encoding="utf-8")
+    assert [page.name for page in DOCS.glob("*.md") if f'"{page.name}"' not in told] == []
 
 
 def test_blocks_with_numbers_are_current():

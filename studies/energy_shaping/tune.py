@@ -292,10 +292,9 @@ def evaluate(
         config.robot, count, rate=config.rate, timestep=config.timestep, threads=config.threads,
         robots=[robots[i % firsts % len(robots)] for i in range(count)],
     )  # fmt: skip
-    command = np.tile(np.repeat(commands, firsts), len(candidates))
     controller = EnergyShaping(config.robot, ShapingGains(**stacked), rate=config.rate)
-    ticks = round(seconds * config.rate)
-    run = rollout(controller, config, np.tile(command, (ticks, 1)), seed, legs=legs)
+    asked = np.tile(np.repeat(commands, firsts), (round(seconds * config.rate), len(candidates)))
+    run = rollout(controller, config, asked, seed, legs=legs)
     return [
         [
             score(run, c, slice(first, first + firsts))

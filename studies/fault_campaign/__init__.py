@@ -13,9 +13,9 @@ _LIES = "'dead encoder' 'frozen sample' 'stale samples' 'false torque' 'false ve
 _LIES += " 'swapped replies' 'one id for two' 'fast clock' 'lie and fault'"
 
 RESULTS = (
-    f"{_TRY} --repeats 8 --live 0 --families {_SHOWN}"
+    f"{_TRY} --repeats 42 --live 0 --families {_SHOWN}"
     " --json studies/fault_campaign/results/fault_campaign.json",
-    f"{_TRY} --repeats 5 --live 2 --families {_LIVE}"
+    f"{_TRY} --repeats 10 --live 2 --families {_LIVE}"
     " --json studies/fault_campaign/results/real_time.json",
     "python -m studies.fault_campaign --controllers fast energy-shaping universal --live 0"
     f" --seed 11 --repeats 372 --families {_LIES} --json studies/fault_campaign/results/lies.json",

@@ -68,7 +68,8 @@ def _hop(scene: Scene, emulator: EmulatorProcess, folder: Path) -> Result:
     result.disturbed = not record.faults or (
         reason in _OF_A_SLOW_COMPUTER and reason not in scene.family.reasons
     )
-    result.began = record.faults[0][0] if record.faults else _armed(record.log)
+    powered = (told.time for told in record.log.commands if told.mode is DriveMode.POSITION)
+    result.began = record.faults[0][0] if record.faults else next(powered, 0.0)
     judge_wire(result, scene, record.log, emulator.state().modes)
     judge_trace(result, done, None if result.disturbed else scene.family)
     return result
@@ -108,11 +109,6 @@ def gave_up(folder: Path) -> bool:
     except TraceError:
         return False
     return any(event.get("reason") in slow for t in traces for event in t.header["events"])
-
-
-def _armed(log: WireLog) -> float:
-    """Return when torque was commanded for the first time, s."""
-    return next((told.time for told in log.commands if told.mode is DriveMode.POSITION), 0.0)
 
 
 def _flown(emulator: EmulatorProcess, seconds: float) -> bool:

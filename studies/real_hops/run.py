@@ -120,27 +120,23 @@ def _row(hops: Sequence[Hop], found: Sequence[Simulated]) -> dict[str, Any]:
     row: dict[str, Any] = {"hops": len(hops), "inside_90": None, "half_width_m": None}
     runs = [hop.run for hop in hops]
     for name, unit in (("push", "s"), ("flight", "s"), ("speed", "m_s"), ("apex", "m")):
-        by_run = [
-            [e[name] for e, r in zip(each, runs, strict=True) if r == run] for run in set(runs)
-        ]
-        known = [np.array(v)[np.isfinite(v)] for v in by_run if np.isfinite(v).any()]
-        for how, statistic in (("mean", _mean), ("rms", _rms)):
-            value, low, high = float("nan"), float("nan"), float("nan")
-            if known:
-                value = statistic(known)
-                low, high = statistics.bootstrap(known, statistic, 0, _LEAST_RUNS)
-            row |= {f"{name}_{how}_{unit}": value, f"{name}_{how}_{unit}_interval": [low, high]}
+        values, of = np.array([e[name] for e in each]), np.array(runs)
+        known = [v[np.isfinite(v)] for v in (values[of == run] for run in dict.fromkeys(runs))]
+        known = [run for run in known if len(run)]
+        value, ends = np.full(2, np.nan), np.full((2, 2), np.nan)
+        if known:
+            value, ends = _moments(known), statistics.bootstrap(known, _moments, 0, _LEAST_RUNS)
+        for how, number, interval in zip(("mean", "rms"), value, ends.T, strict=True):
+            row[f"{name}_{how}_{unit}"] = float(number)
+            row[f"{name}_{how}_{unit}_interval"] = interval.tolist()
     row["not_landed"] = int(np.sum([np.isnan(one.touchdown_s) for one in found]))
     row["torque_rms_nm"] = np.sqrt(np.mean(np.square(torques), axis=0)).tolist()
     return row
 
 
-def _mean(runs: Sequence[Array]) -> float:
-    return float(np.mean(np.concatenate(list(runs))))
-
-
-def _rms(runs: Sequence[Array]) -> float:
-    return float(np.sqrt(np.mean(np.square(np.concatenate(list(runs))))))
+def _moments(runs: Sequence[Array]) -> Array:
+    every = np.concatenate(list(runs))
+    return np.array([np.mean(every), np.sqrt(np.mean(np.square(every)))])
 
 
 def _coverage(

@@ -8,7 +8,6 @@ add to what is there.
 
 Examples:
   python -m studies.sim_to_real transfer --json transfer.json
-  python -m studies.sim_to_real transfer --twins 10 --seeds 0 1 2 --jobs 8
   python -m studies.sim_to_real zero-shot --controllers universal energy-shaping --twins 100
 """
 

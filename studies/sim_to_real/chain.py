@@ -44,7 +44,7 @@ class Experiment:
     """Seeds of the trainings, one of each method and twin each."""
     recipe: str = "fast"
     """Recipe by which policies are trained, as in `hop train`."""
-    steps: int = 1_200_000
+    steps: int = 300_000
     """Control steps of experience of a training."""
     seconds: float = 60.0
     """Duration of each recording, s; the paper's are 240 s, a swing per amplitude takes 30 s."""

@@ -11,14 +11,8 @@ import numpy as np
 from hopping_leg import io
 from hopping_leg.arrays import BoolArray, IntArray
 from hopping_leg.cli.options import Heights, JsonFile, at_least, say
-from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.controllers import RolloutConfig, registry, rollout
 from hopping_leg.controllers.command_schedule import command_range
-from hopping_leg.controllers.registry import (
-    ENERGY_SHAPING,
-    ENERGY_SHAPING_TUNED,
-    MPC_TRUE_STATE,
-    load_controller,
-)
 from hopping_leg.controllers.rollout import Rollout
 from hopping_leg.deploy.drive_link import DriveMode, Reply
 from hopping_leg.deploy.safety_limits import hopping_limits
@@ -118,7 +112,7 @@ def try_out(source: str, name: str, commands: Sequence[float], seconds: float, n
     """Let a controller hop on the leg of a robot file at each command; return the pairs."""
     robot, believed = load_robot(source), believed_of(source)
     config = RolloutConfig(robot, disturbance_of(robot, noise), threads=1)
-    controller = load_controller(name, believed, simulated=True)
+    controller = registry.load_controller(name, believed, simulated=True)
     heights = trials.scaled(commands, believed)
     shown = np.clip(heights, *command_range(controller, believed))
     schedule = np.tile(shown, (round(seconds * config.rate), 1))
@@ -143,8 +137,8 @@ def summarize(pairs: Sequence[Row]) -> list[Row]:
             "disturbance": noise,
             "pairs": len(own),
             **_shares(own),
-            "closer_than_energy_shaping": _closer(own, pairs, ENERGY_SHAPING),
-            "closer_than_tuned": _closer(own, pairs, ENERGY_SHAPING_TUNED),
+            "closer_than_energy_shaping": _closer(own, pairs, registry.ENERGY_SHAPING),
+            "closer_than_tuned": _closer(own, pairs, registry.ENERGY_SHAPING_TUNED),
             "median_abs_error_m": float(np.median(errors)),
             "worst_abs_error_m": max(errors),
             "median_std_m": float(np.median(stds)) if stds else None,
@@ -184,7 +178,7 @@ def _place(row: Row) -> tuple[str, float, str]:
 class ZeroShot:
     """Let controllers hop on legs that they have never met: drawn twins, or a folder's robots."""
 
-    controllers: tuple[str, ...] = ("universal", ENERGY_SHAPING, ENERGY_SHAPING_TUNED)
+    controllers: tuple[str, ...] = ("universal", "energy-shaping", "energy-shaping-tuned")
     """Names or files of controllers; each is told the robot that a twin's file extends."""
     twins: int = 100
     """How many twins to draw."""
@@ -208,7 +202,7 @@ class ZeroShot:
         """Hop, print the summary, return every number."""
         at_least(1, jobs=self.jobs, twins=self.twins)
         asked = itertools.product(dict.fromkeys(self.controllers), dict.fromkeys(self.disturbance))
-        every = list(dict.fromkeys([(MPC_TRUE_STATE, "off"), *asked]))
+        every = list(dict.fromkeys([(registry.MPC_TRUE_STATE, "off"), *asked]))
         sources = self._sources()
         tried = do_all((self._trial(s, *one) for s in sources for one in every), self.jobs)
         pairs = [row for found in tried for row in found["pairs"]]
@@ -228,7 +222,7 @@ class ZeroShot:
         )  # fmt: skip
         say(
             f"{len(reached)} of {places} pairs of leg and command are within reach of"
-            f" {MPC_TRUE_STATE}, undisturbed; shares are of all."
+            f" {registry.MPC_TRUE_STATE}, undisturbed; shares are of all."
         )
         return {
             "legs": len(sources),
@@ -241,7 +235,7 @@ class ZeroShot:
     def _trial(self, source: str, name: str, noise: Noise) -> tuple[Any, ...]:
         believed = believed_of(source)
         asked = {
-            "controller": fingerprint(load_controller(name, believed, simulated=True)),
+            "controller": fingerprint(registry.load_controller(name, believed, simulated=True)),
             "robot": load_robot(source).digest,
             "believed": believed.digest,
             "commands": self.commands,

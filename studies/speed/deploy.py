@@ -157,6 +157,8 @@ def _hopping(trace: Trace) -> Trace:
 
 def _ticks(trace: Trace) -> Row:
     """Return percentiles, and the share of all ticks due that were done within their period."""
+    if trace.table.is_empty():
+        return {"ticks": 0}  # The leg was stopped before it hopped.
     took, skipped = trace.column("tick_s"), int(trace.column("skipped_ticks").sum())
     fresh = np.minimum(trace.column("hip_fresh"), trace.column("knee_fresh"))
     return {
@@ -171,6 +173,5 @@ def _ticks(trace: Trace) -> Row:
 
 def _percentiles(seconds: Array) -> dict[str, float]:
     """Return percentiles and maximum, us."""
-    values = 1e6 * seconds
-    found = {f"p{p:g}": float(np.percentile(values, p)) for p in (50, 99, 99.9)}
-    return found | {"max": float(values.max())}
+    found = 1e6 * np.percentile(seconds, (50, 99, 99.9, 100))
+    return dict(zip(("p50", "p99", "p99.9", "max"), found.tolist(), strict=True))

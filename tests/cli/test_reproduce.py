@@ -51,7 +51,7 @@ def test_a_killed_quick_run_goes_on_and_says_that_its_numbers_mean_nothing(tmp_p
     evaluation, transfer = (json.loads(file.read_text()) for file in files)
     assert {row["controller"] for row in evaluation["summary"]} >= {"energy-shaping"}
     met = {row["controller"] for row in transfer["summary"]}
-    assert met == {"identified", "cad", "energy-shaping"}
+    assert met == {"identified", "cad", "energy-shaping-tuned"}
     assert evaluation["notes"][0] == transfer["notes"][0] == NOTHING_MEANT
     page = (folder / "report.html").read_text()
     assert page.index(html.escape(hops)) < page.index(html.escape(wins)) < page.index("<figure>")

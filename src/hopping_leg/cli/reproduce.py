@@ -2,9 +2,9 @@
 
 A twin plays the real leg. It is recorded, identified from the recordings, a policy is trained from
 scratch on what was identified and hops on the twin without tuning, beside one that was trained on
-the CAD's robot and beside energy shaping: that is said first. Then the paper's trials judge it in
-its own simulation, beside the shipped policies. A run that was killed goes on where it was when the
-same command is called again. `python -m studies.sim_to_real`, in a checkout, does it on many twins.
+the CAD's robot and energy shaping tuned on other twins: that is said first. The paper's trials
+judge it in its own simulation, beside the shipped policies. A run that was killed goes on with the
+same command. `python -m studies.sim_to_real`, in a checkout, does it on many twins.
 
 Examples:
   hop reproduce --quick                         # does everything work here?
@@ -34,7 +34,8 @@ COMMANDS = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)  # Apex heights at which the twi
 
 _RECORD_SECONDS = 30.0  # on each rig
 _FIRST_SEED = 1000  # of noise on the twin; it chose nothing
-_RECORDED = Path("studies/real_hops/results/real_hops.json")  # In a checkout, its result
+_RECORDED = Path("studies/real_hops/results/real_hops.json")  # in a checkout, and rows of it:
+_BOOM = "boom, 200 Hz", "torques as measured"
 _INERTIA_FACTOR = 10.0  # the paper's Table I has nine times the CAD's inertia of the shank
 
 NOTHING_MEANT = (
@@ -59,13 +60,13 @@ class Reproduce:
 def run(args: Reproduce) -> None:
     """Record, identify, train, hop on the twin, evaluate, report."""
     from hopping_leg.cli import evaluate
-    from hopping_leg.controllers.registry import ENERGY_SHAPING, shipped_policies
+    from hopping_leg.controllers import registry
     from hopping_leg.locks import hold_folder
     from hopping_leg.sim.randomization import draw_twin
 
     folder = args.out or Path("runs") / ("quick" if args.quick else "reproduce")
-    notes, drawn = [NOTHING_MEANT] if args.quick else [], draw_twin(0)
     options.at_least(0, seed=args.seed)
+    notes, drawn = [NOTHING_MEANT] if args.quick else [], draw_twin(0)
     twin, believed = drawn.robot, str(drawn.tree["extends"])
     with hold_folder(folder, UsageError):
         file, asked_for = folder / "options.json", {"seed": args.seed, "quick": args.quick}
@@ -78,15 +79,15 @@ def run(args: Reproduce) -> None:
             name: (_train(robot, folder / "training", args), robot)
             for name, robot in {"identified": identified, "cad": believed}.items()
         }
-        told[ENERGY_SHAPING] = ENERGY_SHAPING, believed
+        told[registry.ENERGY_SHAPING_TUNED] = registry.ENERGY_SHAPING_TUNED, believed
         transfer = _hop(twin, told, quick=args.quick)
     policy, _ = told["identified"]
     said = [*notes, *_outcome(transfer)]
     evaluate.keep(evaluate.Evaluate((), out=folder), transfer, said)
-    others = ("fast",) if args.quick else shipped_policies()
+    others = ("fast",) if args.quick else registry.shipped_policies()
     options.say(*said)
     asked = evaluate.Evaluate(
-        (f"identified={policy}", *others, ENERGY_SHAPING), robot=identified,
+        (f"identified={policy}", *others, registry.ENERGY_SHAPING), robot=identified,
         seeds=1 if args.quick else 5, out=folder / "simulation",
         floor="soft" if args.quick else "both",
     )  # fmt: skip
@@ -103,8 +104,8 @@ def _outcome(transfer: "EvaluationRun") -> list[str]:
 
     found = []
     for name in transfer.evaluation.controllers:
-        traces = [run.trace for run in transfer.runs if run.controller == name]
-        windows = [window for trace in traces for window in metrics.measure(trace)]
+        own = (run.trace for run in transfer.runs if run.controller == name)
+        windows = [window for trace in own for window in metrics.measure(trace)]
         errors = [1e3 * abs(error) for error in metrics.errors_of(windows)]
         low, high = statistics.median_interval(errors, _FIRST_SEED)
         heights = len({window.command for window in windows if len(window.apex)})
@@ -113,15 +114,13 @@ def _outcome(transfer: "EvaluationRun") -> list[str]:
     wins = f"{best[3]} wins" if best[2] < second[1] else "None wins clearly"
     hops = ", ".join(f"{name} {heights}" for *_, name, heights in found)
     listed = ", ".join(f"{name} {x:.1f} [{low:.1f}, {high:.1f}]" for x, low, high, name, _ in found)
-    said = [
-        f"On the twin hop, of {len(COMMANDS)} heights: {hops}.",
-        f"{wins}: median |apex - command| and its 95 % interval, mm: {listed}.",
-    ]
+    said = [f"On the twin hop, of {len(COMMANDS)} heights: {hops}."]
+    said += [f"{wins}: median |apex - command| and its 95 % interval, mm: {listed}."]
     if _RECORDED.exists():
         rows = io.parse_json(_RECORDED.read_bytes(), str(_RECORDED))["rows"]
-        rms = {r["robot"]: 1e3 * r["apex_rms_m"] for r in rows if r["drive"].startswith("torques")}
-        said.append(  # of the two booms' rows the later, at 200 Hz
-            f"Hops of the real leg on a boom: {rms['legv2-identified']:.0f} mm rms off in its"
+        rms = {r["robot"]: 1e3 * r["apex_rms_m"] for r in rows if (r["rig"], r["drive"]) == _BOOM}
+        said.append(
+            f"Hops of the real leg, {_BOOM[0]}: {rms['legv2-identified']:.0f} mm rms off in its"
             f" identified simulation, {rms['legv2']:.0f} in the CAD's (studies/real_hops)."
         )
     return said

@@ -10,7 +10,7 @@ leave room for impacts, play and noise, and were set on simulated runs:
   for a joint that rattles faster than replies tell.
 - What a motor gives is what it was told, within what it can give at its speed, and always about as
   late: where the torques of both joints come later than before, samples are old. Torques that
-  alternate from tick to tick tell neither.
+  alternate from tick to tick tell neither, nor does a joint that is shaken.
 """
 
 import math
@@ -36,13 +36,14 @@ _WAY = 4e-3  # rad between two replies from which on position and velocity are c
 _OTHER_WAY = (1e-3, 0.33)  # rad, and share of the longer way, by which they may differ
 _CONTRADICTIONS = 7  # in a row; impacts and play make four
 _RATTLE = 0.5  # rad/s by which the velocity of a joint that rattles goes up and down in turn
+_SHAKEN = 10.0  # rad/s between two replies: so fast a motor's torque is not that of one speed
 _PUSH = 1e-2  # of squared torques over the limit squared that must be known
 _GIVEN = 0.1  # least torque reported over torque told
 
 _TICKS = 4  # by which a reported torque may come after the command
 _LAGS = 2 * _TICKS - 1  # 1, 1.5, 2, ... ticks
 _LATEST = 3  # of these, the last that is a healthy drive's
-_LAG_FADING = 10  # ticks
+_LAG_FADING = 10  # ticks, which must be known before a lag is
 _LAG_CHANGE = 0.01  # of squared changes of torque over the limit squared that must be known
 _LAG_CLEAR = 3.0  # factor by which one lag must explain the torques better than one a tick away
 _LAG_WORSE = 8.0  # factor by which the usual lag, and half a tick more, must explain them worse
@@ -136,7 +137,7 @@ class JointEvidence:
             rattles = swing * self.swing < 0 and min(abs(swing), abs(self.swing)) > _RATTLE
             if rattles or reply.velocity * last.velocity <= 0:
                 contradictions = 0
-            weight = 0.0 if rattles else 1.0
+            weight = 0.0 if rattles or self.shaken > _SHAKEN else 1.0
             fading, mean = math.exp(-elapsed / _FADING), (given + self.given) / 2
             first, second, third = (
                 motor.share(torque, reply.velocity) for torque in (told, *self.told)
@@ -208,7 +209,7 @@ class LagEvidence:
         self, motors: tuple[MotorLine, MotorLine], replies: tuple[Reply, Reply], told: Pair
     ) -> "LagEvidence":
         """Return the evidence with fresh replies of both drives, a tick after the last ones."""
-        past = (told, *self.told)[: _TICKS + 1]
+        past = (told, *self.told)[: _LAG_FADING + 1]
         hip, knee = (r.torque / m.limit for r, m in zip(replies, motors, strict=True))
         if len(past) <= _TICKS:
             return LagEvidence(past, (hip, knee), usual=self.usual)
@@ -216,7 +217,7 @@ class LagEvidence:
         errors, changes = [fading * error for error in self.errors], fading * self.changes
         for joint, given in enumerate((hip - self.given[0], knee - self.given[1])):
             velocity = replies[joint].velocity
-            shares = [motors[joint].share(pair[joint], velocity) for pair in past]
+            shares = [motors[joint].share(pair[joint], velocity) for pair in past[: _TICKS + 1]]
             steps = [newer - older for newer, older in pairwise(shares)]
             for lag in range(_LAGS):
                 off = given - (steps[lag // 2] + steps[(lag + 1) // 2]) / 2
@@ -225,7 +226,7 @@ class LagEvidence:
         best = errors.index(min(errors))
         away = min(errors[: max(best - 1, 0)] + errors[best + 2 :])
         clear = changes > _LAG_CHANGE and away > _LAG_CLEAR * errors[best] + 1e-6
-        usual = min(self.usual, best) if clear else self.usual
+        usual = min(self.usual, best) if clear and len(past) > _LAG_FADING else self.usual
         least = min(errors[usual : usual + 2], default=0.0)
         worse = changes > _LAG_CHANGE and least > _LAG_WORSE * errors[best] + _LAG_CHANGE / 4
         late = self.late + 1 if worse and best > usual + 1 else 0

@@ -10,6 +10,9 @@ from hopping_leg.rl import recipe
 from hopping_leg.rl.dagger import DaggerConfig
 from hopping_leg.rl.students import StudentConfig
 
+COARSE = Planning(timestep=1.25e-3, elastic_timestep=5e-4, simulations=3, tolerance=3e-4, every=2)
+"""Plans that labels need no finer."""
+
 FAST = recipe.Recipe(
     name="fast",
     task=TaskConfig(
@@ -22,17 +25,17 @@ FAST = recipe.Recipe(
         random_episode_start=True,
     ),
     algorithm=DaggerConfig(
-        learning_rate=2e-3,
+        learning_rate=3e-3,
         n_steps=32,
         gradient_steps=32,
-        batch_size=2048,
-        planning=Planning(elastic_timestep=5e-4),
+        batch_size=1024,
+        planning=COARSE,
     ),
     network=StudentConfig(hidden=(128, 64)),
-    schedule=recipe.Schedule(num_envs=256, steps=500_000, log_every=8),
+    schedule=recipe.Schedule(num_envs=256, steps=300_000, log_every=8),
     selection=recipe.SelectionConfig(
         eval_every=10**9,
         eval_commands=(0.22, 0.26, 0.30, 0.34, 0.38, 0.42),
-        calibrations=3,
+        calibrations=2,
     ),
 )

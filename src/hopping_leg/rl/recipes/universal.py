@@ -9,11 +9,11 @@ What is left of a miss corrects its command. Some of the legs are pushed.
 
 from dataclasses import replace
 
-from hopping_leg.controllers.mpc import HopShape, Planning
+from hopping_leg.controllers.mpc import HopShape
 from hopping_leg.controllers.observation_history import AnyLeg
 from hopping_leg.rl import recipe
 from hopping_leg.rl.dagger import DaggerConfig
-from hopping_leg.rl.recipes.fast import FAST
+from hopping_leg.rl.recipes.fast import COARSE, FAST
 from hopping_leg.rl.students import StudentConfig
 
 UNIVERSAL = recipe.Recipe(
@@ -41,9 +41,7 @@ UNIVERSAL = recipe.Recipe(
         outlier=0.15,
         hidden_weight=0.3,
         teacher=HopShape(fold=-0.4, knee_gap=0.06),
-        planning=Planning(
-            timestep=1.25e-3, elastic_timestep=5e-4, simulations=3, tolerance=3e-4, every=2
-        ),
+        planning=COARSE,
     ),
     network=StudentConfig(memory="gru", hidden=(192,), size=192, update_every=4, correction=0.01),
     schedule=recipe.Schedule(num_envs=1024, steps=75_000_000, log_every=8),
