@@ -82,12 +82,13 @@ class EnergyShaping:
         push = self._force(leg, command, liftoff, landing)
         side = -gains.kp_y * leg.y - gains.kd_y * leg.y_rate
         force = np.stack([push, side], axis=-1)  # on the ground, and forwards, N
-        pressing: Array = np.einsum("nij,ni->nj", leg.jacobian, force)
+        pressing = np.einsum("nij,ni->nj", leg.jacobian, force)
         share = np.where(self._phase == Phase.FLIGHT, 0.0, 1.0)
         pushes = self._phase == Phase.LIFTOFF
         self._share = np.where(pushes, self._pushing_share(leg, liftoff), share)
         self._rate = leg.rate
-        return flying + self._share[:, None] * (pressing - flying)
+        torque: Array = flying + self._share[:, None] * (pressing - flying)
+        return torque
 
     def internals(self) -> dict[str, Array]:
         """Return height estimates, phase and gain of the last tick."""
