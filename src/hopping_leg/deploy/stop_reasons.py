@@ -66,10 +66,7 @@ _ON_TIME = 0.2
 
 
 def _late_text(seconds: float) -> str:
-    return (
-        f"{seconds * 1e3:.1f} ms late; end other programs, or permit real-time priority as the"
-        " notice says"
-    )
+    return f"{seconds * 1e3:.1f} ms late; end other programs, or permit real-time priority"
 
 
 def fault_text(code: int) -> str:
