@@ -206,8 +206,8 @@ def load_excitation(path: Path) -> Excitation:
         raise TraceError(f"{path} has no rate; write it again with `hop record`.")
     trace.require_ticks(path)
     targets = np.column_stack([trace.column(name) for name in TARGETS])
-    time = trace.column("time_s")
-    return Excitation(time, targets[:, :2], targets[:, 2:], *map(facts.get, _FACTS))
+    time, facts = trace.column("time_s"), [facts[name] for name in _FACTS]
+    return Excitation(time, targets[:, :2], targets[:, 2:], *facts)
 
 
 def make_excitation(

@@ -135,7 +135,7 @@ class ReplaySource:
 
     def __init__(self, paths: tuple[Path, ...], robot: str | None = None) -> None:
         if not 1 <= len(paths) <= MOST:
-            raise errors.UsageError(f"Give one trace, or two side by side, not {len(paths)}.")
+            raise errors.UsageError(f"Give one, or two traces side by side, not {len(paths)}.")
         self.notices: list[str] = []
         self.now = 0.0
         self.tracks = [self._load(path, robot) for path in paths]
