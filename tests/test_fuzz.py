@@ -31,6 +31,7 @@ from hopping_leg.controllers.registry import load_policy
 from hopping_leg.deploy.flight_recorder import FlightRecorder
 from hopping_leg.emulator.faults import load_faults
 from hopping_leg.errors import HoppingLegError
+from hopping_leg.evaluate import metrics, trials
 from hopping_leg.flight_recording import MAGIC, frame, recover
 from hopping_leg.identify.excitation import Multisine, load_excitation, make_excitation
 from hopping_leg.identify.recording import load_recording
@@ -166,7 +167,7 @@ def flight():
         box.event(state="damping")
         box.close()
 
-    return recover, written(write)
+    return lambda path: metrics.measure(trials.load_run(path).trace), written(write)
 
 
 def frames():

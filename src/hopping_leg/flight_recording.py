@@ -121,7 +121,7 @@ def recover(path: Path) -> trace.Trace:
     with contextlib.closing(FlightRecorderTail(path)) as box:
         rows = box.rows()
     if not len(rows):
-        raise errors.TraceError(f"{path} holds no tick; the run had not begun.")
+        raise errors.TraceError(f"{path} holds no tick of a run.")
     missing = [name for name in trace.COLUMNS if name not in box.columns]
     table = pl.DataFrame(dict(zip(box.columns, rows.T, strict=True))).with_columns(
         pl.lit(float("nan")).alias(name) for name in missing

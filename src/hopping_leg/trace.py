@@ -75,6 +75,12 @@ class Trace:
         except (TypeError, ValueError) as error:
             raise TraceError(f"The trace's column '{name}' holds no numbers.") from error
 
+    def require_ticks(self, path: Path) -> None:
+        """Raise TraceError that names a file unless it has two ticks or more, at rising times."""
+        steps = np.diff(self.column("time_s"))
+        if not (len(steps) and steps.min() > 0 and np.isfinite(steps).all()):
+            raise TraceError(f"{path} holds no ticks in a row: its 'time_s' must rise.")
+
     def save(self, path: Path) -> None:
         """Write the trace; an existing file is replaced only once the new one is complete."""
         header = json.dumps({"schema": SCHEMA, **self.header}, sort_keys=True)

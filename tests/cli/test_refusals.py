@@ -29,6 +29,7 @@ REFUSED = [
     ("evaluate spring --seed -1", "--seed is -1"),
     ("evaluate spring --threads -1", "'threads' is -1"),
     ("evaluate spring --timestep 0.003", "does not divide"),
+    ("evaluate spring --json empty.csv/x.json", "x.json cannot be written"),
     ("deploy fasst", "Did you mean 'fast'"),
     ("deploy fast --command 0.6", f"from {FAST.command_low:.2f} to {FAST.command_high:.2f} m"),
     ("deploy fast --robot legv2", f"was trained on robot '{FAST.robot}'"),

@@ -10,6 +10,7 @@ import time
 import numpy as np
 import pytest
 from numba.core import event
+from polars.exceptions import PanicException
 
 from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.registry import load_controller
@@ -241,7 +242,7 @@ def test_the_flight_recording_goes_only_once_the_trace_is_whole(tmp_path, monkey
 
 def test_a_trace_that_cannot_be_written_names_the_stop_and_the_next_command(tmp_path, monkeypatch):
     def full(self, path):
-        raise TraceError("Cannot write it: No space left on device.")
+        raise PanicException("No space left on device.")
 
     monkeypatch.setattr(Trace, "save", full)
     controller = Still()

@@ -46,6 +46,7 @@ def test_identity_is_read_as_words(bench):
 
 @given(st.binary(max_size=64))
 @example(bytes([0x10, 0xFF, 0xFF, 0xFF, 0x7F, 0x00]))
+@example(b"\x0d\x00\x00\x00\xc0\x7f\x0d\xb0\x02\x00\x00\x80\x7f")  # mode NaN, output at inf
 def test_no_payload_breaks_a_drive(bench, data):
     bench.robot.receive(Frame(0x807F, data))
     bench.wait(5e-4)

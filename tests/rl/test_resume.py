@@ -67,6 +67,6 @@ def test_a_run_is_never_overwritten_or_mixed(tmp_path, monkeypatch):
             module.train(recipe, ROBOT, seed, out, resume=bool(resume), quiet=True)
     assert done.policy.read_bytes() == content
     done.policy.unlink()
-    write_checkpoint(out / "checkpoints", 64, {"learner": {}})
+    write_checkpoint(out / "checkpoints", 64, {"learner": []})
     with pytest.raises(UsageError, match="another version"):
         module.train(recipe, ROBOT, 0, out, resume=True, quiet=True)

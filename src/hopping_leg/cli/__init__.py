@@ -120,12 +120,16 @@ def _dispatch(words: list[str]) -> int:
     except (AttributeError, RuntimeError) as error:  # where MuJoCo imports OpenGL
         if "mujoco" in sys.modules or (drawing := os.environ.get("MUJOCO_GL")) is None:
             raise
-        sentence = (
+        raise UsageError(
             f"MuJoCo finds no library for MUJOCO_GL={drawing} ({error}); unset or install it."
-        )
-        raise UsageError(sentence) from error
+        ) from error
     kind = get_type_hints(module.run, include_extras=True)["args"]
-    module.run(read_options(kind, f"hop {verb}", inspect.getdoc(module), rest))
+    args = read_options(kind, f"hop {verb}", inspect.getdoc(module), rest)
+    if (file := getattr(args, "json", None)) and not os.access(file, os.W_OK):
+        place = next(place for place in file.absolute().parents if place.exists())
+        if not (place.is_dir() and os.access(place, os.W_OK)):
+            raise UsageError(f"--json {file} cannot be written; give another file.")
+    module.run(args)
     return 0
 
 

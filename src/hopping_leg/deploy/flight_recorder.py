@@ -48,7 +48,7 @@ class FlightRecorder:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
         except OSError as error:
-            raise errors.TraceError(f"Cannot create {path}: {error.strerror}.") from error
+            raise errors.TraceError(f"Cannot create {error.filename}: {error.strerror}.") from error
         try:
             if os.write(self._file, first) < len(first):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

@@ -105,11 +105,10 @@ def perform(
         recorder.close()
     share = outcome.ticks / max(outcome.ticks + outcome.skipped, 1)
     if share < _FULL_RATE:
-        sentence = (
+        notices += (
             f"The loop ran at {rate * share:.0f} instead of {rate:g} Hz: this computer was late;"
-            " end other programs, or permit real-time priority."
+            " end other programs, or permit real-time priority.",
         )
-        notices += (sentence,)
     return _finish(outcome, recorder, path, notices)
 
 
@@ -168,10 +167,10 @@ def _finish(
             trace.header["events"].append({"record": complaint or notice})
         trace.save(path)
         whole = Trace.load(path).table.height == recorder.rows
-    except (TraceError, OSError) as error:
+    except BaseException as error:  # polars panics where it can open nothing more
         raise TraceError(
-            f"The run is over: {outcome.supervisor.stop_cause} {error} All that was recorded is in"
-            f" {kept}; once there is room, `{_draw(kept)}` writes the trace."
+            f"The run is over: {outcome.supervisor.stop_cause} {complaint} {error} What the disk"
+            f" took is in {kept}; once there is room, `{_draw(kept)}` writes the trace."
         ) from error
     if whole and not complaint:
         kept.unlink()
@@ -205,12 +204,11 @@ def _header(robot: Robot, controller: protocol.Controller, rate: float) -> dict[
 
 def new_path(folder: Path, name: str) -> Path:
     """Return a trace's path that no earlier run has."""
-    safe = safe_file_name(name)
-    stamp = datetime.datetime.now(datetime.UTC).strftime("%Y%m%d-%H%M%S")
-    path, count = folder / f"{safe}-{stamp}.parquet", 1
+    stem = f"{safe_file_name(name)}-{datetime.datetime.now(datetime.UTC):%Y%m%d-%H%M%S}"
+    path, count = folder / f"{stem}.parquet", 1
     while path.exists() or path.with_suffix(flight_recording.SUFFIX).exists():
         count += 1
-        path = folder / f"{safe}-{stamp}-{count}.parquet"
+        path = folder / f"{stem}-{count}.parquet"
     return path
 
 

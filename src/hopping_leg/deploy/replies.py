@@ -12,12 +12,12 @@ from moteus import multiplex
 from moteus.multiplex import SubframeType
 from moteus.protocol import Register, scale_register
 
-from hopping_leg.deploy.drive_link import JointTransform, Reply
+from hopping_leg.deploy.drive_link import DriveMode, JointTransform, Reply
 
 _WRAP, _HALF = 1 << 32, 1 << 31
 _DRIFT = 2e-4  # Most that two clocks drift apart, s/s: both are quartzes
 _RESTART = -500
-"""A counter that falls back further than this, ms, began anew: no reply is held up so long."""
+"""A counter that falls back further, ms, began anew, unless its drive ``follows`` torques."""
 
 _ANALOG = range(Register.AUX1_ANALOG_IN1, Register.AUX2_ANALOG_IN5 + 1)
 _ENCODERS = {Register.ENCODER_1_POSITION: 0b100, Register.ENCODER_2_POSITION: 0b10000}
@@ -39,10 +39,10 @@ class DriveClock:
         self.ahead = 0.0
         """What the drive's clock has gained, beyond what quartzes do, s."""
 
-    def date(self, counter: int, arrived: float) -> float | None:
+    def date(self, counter: int, arrived: float, *, follows: bool = False) -> float | None:
         """Return when a reply was measured, s on the host's clock; None if it was seen before."""
         step = (counter - (self._counter or 0) + _HALF) % _WRAP - _HALF
-        if self._counter is None or step < _RESTART:
+        if self._counter is None or (step < _RESTART and not follows):
             self._counter, self._time = counter, counter % _WRAP * 1e-3
             self._offset, self._updated = arrived - self._time, arrived
             self._replies, self._least, self._began, self.ahead = 0, math.inf, arrived, 0.0
@@ -96,7 +96,7 @@ def read_reply(
         temperature, sensed = values[Register.TEMPERATURE], sensor_reading(values)
     except Exception:
         return None
-    taken = clock.date(int(counter), now)
+    taken = clock.date(int(counter), now, follows=mode == DriveMode.POSITION)
     if taken is None or not math.isfinite(taken):
         return None
     return Reply(

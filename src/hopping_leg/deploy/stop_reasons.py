@@ -53,7 +53,7 @@ class Reason(IntEnum):
     TORQUE_FALSE = 33, "A drive reports another torque than it was told."
     SAMPLES_STALE = 34, "The drives' samples are older than before."
     DRIVE_CLOCK = 35, "A drive's clock does not run as this computer's does."
-    CONTROLLER_SLOW = 28, "The controller takes longer than a control period has."
+    CONTROLLER_SLOW = 28, "The controller took too much of a control period."
 
 
 _DRIFT_SECONDS = 1.0  # Time after which a drift is forgotten
@@ -66,10 +66,7 @@ _ON_TIME = 0.2
 
 
 def _late_text(seconds: float) -> str:
-    return (
-        f"{seconds * 1e3:.1f} ms late; end other programs, or permit real-time priority as the"
-        " notice says"
-    )
+    return f"{seconds * 1e3:.1f} ms late; end other programs, or permit real-time priority"
 
 
 def fault_text(code: int) -> str:

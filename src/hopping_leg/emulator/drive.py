@@ -95,11 +95,11 @@ class EmulatedDrive:
     def write(self, register: int, resolution: int, value: float) -> None:
         """Take one register from the host; one that cannot be written stays as it is."""
         scaled = value if resolution == F32 else scale_register(register, resolution, value)
-        if register == Register.MODE and int(scaled) in mode_machine.MODES:
+        if register == Register.MODE and scaled in mode_machine.MODES:
             self.command, self._asked = dict(torque_law.NEW_COMMAND), DriveMode(int(scaled))
         elif register in self.command:
             self.command[register] = float(scaled)
-        elif register == Register.SET_OUTPUT_NEAREST:
+        elif register == Register.SET_OUTPUT_NEAREST and math.isfinite(scaled):
             self.encoder.set_nearest(float(scaled))
 
     def commit(self, time: float) -> None:

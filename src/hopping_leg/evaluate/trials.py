@@ -64,9 +64,7 @@ def choose_commands(
     if commands is None:
         return scaled(COMMANDS, robot)
     if not commands:
-        raise errors.UsageError(
-            "No commands were given; give heights in m, e.g. --commands 0.25,0.30."
-        )
+        raise errors.UsageError("No commands were given; give heights in m, e.g. 0.25,0.30.")
     check_heights(commands, command_limits(robot), robot.name)
     return tuple(sorted(set(commands)))
 
@@ -149,15 +147,16 @@ def load_run(path: Path) -> Run:
     trace = load_trace(path)
     hopping = measured_hopping(trace)
     trace, measured = (trace, "") if hopping is None else (hopping, ", measured")
-    command, time = trace.column("command_m"), trace.column("time_s")
-    period = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    trace.require_ticks(path)
+    command, period = trace.column("command_m"), float(np.median(np.diff(trace.column("time_s"))))
+    if not np.isfinite(command).all():
+        raise errors.TraceError(f"{path} is no run: 'command_m' must be a number in every row.")
     steps = tuple((float(command[a]), (b - a) * period) for a, b in stretches(command))
-    header = trace.header
-    default = "fixed" if len(steps) == 1 else "sequence"
+    header, default = trace.header, "fixed" if len(steps) == 1 else "sequence"
     return Run(
         controller=str(header.get("controller", path.stem)) + measured,
         trial=Trial(steps, str(header.get("kind", default))),
-        repeat=int(header.get("repeat", 0)),
+        repeat=repeat if isinstance(repeat := header.get("repeat"), int) else 0,
         trace=trace,
     )
 

@@ -204,6 +204,7 @@ def load_excitation(path: Path) -> Excitation:
         raise TraceError(f"{path} is no excitation; write one with `hop record`.")
     if not is_number(facts["rate_hz"]) or not facts["rate_hz"] > 0:
         raise TraceError(f"{path} has no rate; write it again with `hop record`.")
+    trace.require_ticks(path)
     targets = np.column_stack([trace.column(name) for name in TARGETS])
     time, facts = trace.column("time_s"), [facts[name] for name in _FACTS]
     return Excitation(time, targets[:, :2], targets[:, 2:], *facts)

@@ -49,16 +49,11 @@ class RunFolder:
         """What the run was asked for, as JSON values."""
 
     def begin(self, *, new: bool) -> checkpoint.Tree | None:
-        """Prepare the folder; return the newest checkpoint if there is one to resume from.
-
-        Raises:
-            UsageError: The folder holds another or finished run.
-        """
+        """Return a run's last checkpoint, if any; ``UsageError`` where the run is finished."""
         if new:
             write_json(self.path / "config.json", self.config)
             write_robot(self.path, self._robot)
             return None
-        self.check_same()
         if self.policy.exists():
             raise UsageError(f"The run in {self.path} is finished; it made {self.policy}.")
         found = checkpoint.list_checkpoints(self.checkpoints)

@@ -87,8 +87,10 @@ def train(
     with Progress(f"{title}, preparing", quiet=quiet) as progress:
         fitted = recipe.fit(robot)
         folder = run_folder.RunFolder(out, fitted, robot, seed, minutes)
-        recipe = reach.within_reach(fitted, robot)
         new = run_folder.is_new(out, resume=resume)  # or refused, before a lock is put into it
+        if not new:
+            folder.check_same()  # before the teacher takes its time
+        recipe = reach.within_reach(fitted, robot)
         with locks.hold_folder(out, errors.UsageError):
             tree = folder.begin(new=new)
             legs = reach.find_legs(
@@ -137,11 +139,11 @@ class Trainer:
         """Go on from a checkpoint; UsageError says that another version wrote it."""
         try:
             self.learner.restore(tree["learner"])
-        except (KeyError, RuntimeError, ValueError) as error:
+            self.selection.rows, self._earlier = tree["history"], float(tree["elapsed"])
+        except (AttributeError, LookupError, RuntimeError, TypeError, ValueError) as error:
             raise errors.UsageError(
                 f"{self.folder.path} was begun by another version; train anew in another folder."
             ) from error
-        self.selection.rows, self._earlier = tree["history"], tree["elapsed"]
         self._began = time.monotonic()
 
     def run(self, command: str) -> Trained:

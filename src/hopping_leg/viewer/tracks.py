@@ -135,9 +135,7 @@ class ReplaySource:
 
     def __init__(self, paths: tuple[Path, ...], robot: str | None = None) -> None:
         if not 1 <= len(paths) <= MOST:
-            raise errors.UsageError(
-                f"{len(paths)} traces were given; give one, or two side by side."
-            )
+            raise errors.UsageError(f"Give one, or two traces side by side, not {len(paths)}.")
         self.notices: list[str] = []
         self.now = 0.0
         self.tracks = [self._load(path, robot) for path in paths]
@@ -157,8 +155,7 @@ class ReplaySource:
 
     def _load(self, path: Path, robot: str | None) -> Track:
         stored = Trace.load(path)
-        if not len(stored.table):
-            raise errors.TraceError(f"{path} holds no tick; there is nothing to show.")
+        stored.require_ticks(path)
         leg = _load_leg(robot, stored.header, path)
         if not leg.has_digest(stored.header.get("robot_digest", leg.digest)):
             self.notices.append(
