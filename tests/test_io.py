@@ -71,15 +71,6 @@ def test_mistakes_in_a_table_are_one_sentence_with_the_field(change, sentence):
         io.read_dataclass(Outer, {"name": "x"}, "f", error=RobotError)
 
 
-def test_one_entry_is_replaced_and_the_rest_stays():
-    outer = Outer("x", Inner())
-    assert io.replace_at(outer, "inner.gain", 2.0) == Outer("x", Inner(gain=2.0))
-    tree = {"a": {"b": 1, "c": 2}, "d": 3}
-    assert io.replace_at(tree, "a.b", 4) == {"a": {"b": 4, "c": 2}, "d": 3}
-    assert io.replace_at(tree, "e.f.g", 5)["e"] == {"f": {"g": 5}}
-    assert tree == {"a": {"b": 1, "c": 2}, "d": 3}
-
-
 def test_a_text_becomes_a_file_name():
     assert io.safe_file_name("my leg/v2.1") == "my_leg_v2.1"
     assert io.safe_file_name("\x1b" * 300) == "_" * 80

@@ -87,8 +87,7 @@ def train(
     with Progress(f"{title}, preparing", quiet=quiet) as progress:
         fitted = recipe.fit(robot)
         folder = run_folder.RunFolder(out, fitted, robot, seed, minutes)
-        new = run_folder.is_new(out, resume=resume)  # or refused, before a lock is put into it
-        if not new:
+        if not (new := run_folder.is_new(out, resume=resume)):  # before there is a lock in it
             folder.check_same()  # before the teacher takes its time
         recipe = reach.within_reach(fitted, robot)
         with locks.hold_folder(out, errors.UsageError):
