@@ -48,7 +48,7 @@ def test_missing_file_and_unknown_name(tmp_path):
     with pytest.raises(UsageError, match=r"'energy-shaping'.*path/to/file\.py:CLASS"):
         load_controller("energy-shapin", ROBOT)
     (tmp_path / "weights.bin").write_bytes(b"PK")
-    with pytest.raises(PolicyError, match=r"end in \.onnx"):
+    with pytest.raises(PolicyError, match=r"\.onnx or \.zip"):
         load_controller(tmp_path / "weights.bin", ROBOT)
 
 
