@@ -98,7 +98,6 @@ _EXTRAS = {
     **dict.fromkeys(("moteus", "can", "serial"), "hardware"),
     **dict.fromkeys(("mcap", "mcap_ros2", "rosbags"), "ros"),
     "viser": "view",
-    "playwright": "dev",
 }
 
 
@@ -143,4 +142,6 @@ def read_options(options: Any, program: str, about: str | None, words: Sequence[
     for word in words:
         listed = _LIST.fullmatch(word) and not os.path.exists(word)  # noqa: PTH110
         apart += word.split(",") if listed else [word]
+    if "--no-video" in apart:  # in scripts from when evaluations made videos
+        apart.remove("--no-video")
     return tyro.cli(options, prog=program, description=about, args=apart, config=_CONFIG)
