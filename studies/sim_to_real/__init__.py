@@ -31,7 +31,7 @@ RESULTS = (
     "--folder runs/transfer-universal --json studies/sim_to_real/results/universal.json",
     *(
         "python -m studies.sim_to_real transfer --methods identified-belt identified cad table-1 "
-        "randomised --steps 300000 "
+        "randomised --seeds 0 1 2 "
         f"--disturbance {noise} --jobs 2 --folder runs/transfer-fast "
         f"--json studies/sim_to_real/results/fast_noise_{noise}.json"
         for noise in ("on", "off")

@@ -78,8 +78,7 @@ def fit(twin: Twin, recordings: Sequence[Path], file: Path, belt: bool) -> Row:
     found = as_json(identified)
     before, after, truth = found["start_validation"], found["validation"], load_robot(twin.source)
     errors = ("closed_loop_position_rms_rad", "closed_loop_torque_rms_nm")
-    kept = ("name", "unit", "start", "value", "interval_low", "interval_high", "at_bound",
-            "bound_low", "bound_high")  # fmt: skip
+    kept = ("name", "unit", "start", "value", "interval_low", "interval_high", "at_bound")
     return {
         "method": "identified-belt" if belt else "identified",
         "twin": twin.name,
