@@ -8,7 +8,7 @@ RESULTS = (
         f"{_RESULTS}/{name}.json --figure {_FIGURES}/{name}.svg"
         for name, recipes, seeds in (
             ("rl", "rl", "0 1 2 3 4"),
-            ("distillation", "fast", "0 1 2"),
+            ("distillation", "fast", "0 1 2 3 4"),
             ("reinforcement_learning", "paper sb3-ppo sb3-sac", "1"),
         )
     ),
