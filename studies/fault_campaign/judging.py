@@ -60,20 +60,20 @@ def judge_wire(result: Result, scene: Scene, log: WireLog, modes: Sequence[int])
 def judge_truth(result: Result, scene: Scene, log: WireLog, truth: Array, trace: Trace) -> None:
     """Add what the leg's true state tells of a trial in which a drive lied.
 
-    No joint may stand at its stop while pushed. A lie about positions matters from when a joint is
-    farther from what its drive says than ``FAR``: from then on the drives may be powered for
+    No joint may stand at its stop while pushed. A lie about positions matters from when an encoder
+    is farther from what its drive says than ``FAR``: from then on the drives may be powered for
     ``LIED_WITHIN``. Samples that are old are as false at once, but not for long.
 
     Args:
         result: To be added to; the mishap has begun.
         scene: Of the trial.
         log: Of the wire.
-        truth: Of the leg, as ``Lockstep`` has it.
+        truth: Of the leg, as ``Lockstep`` has it, and the angles that honest encoders see, rad.
         trace: Of the run.
     """
     assert result.began is not None
     kinds = {fault.kind for fault in (scene.mishap.fault, scene.mishap.second) if fault}
-    time, true = truth[:, 0], truth[:, 3:5]
+    time, true, turned = truth[:, 0], truth[:, 3:5], truth[:, 5:7]
     off = [told.time for told in log.commands if told.mode in SAFE and told.time >= result.began]
     until = min(off, default=math.inf)
     said_at = trace.column("time_s") + time[0]
@@ -88,7 +88,8 @@ def judge_truth(result: Result, scene: Scene, log: WireLog, truth: Array, trace:
         model = getattr(scene.robot, name)
         said = trace.column(f"{name}_position_rad")
         where = np.interp(said_at, time, true[:, joint])
-        wrong = said_at[(np.abs(where - said) > FAR) & (said_at >= result.began)]
+        honest = np.interp(said_at, time, turned[:, joint])
+        wrong = said_at[(np.abs(honest - said) > FAR) & (said_at >= result.began)]
         if wrong.size and wrong[0] <= until:
             powered = until - wrong[0]
             result.reaction = max(result.reaction or 0.0, powered)

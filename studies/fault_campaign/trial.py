@@ -41,6 +41,8 @@ class StruckClock:
     Attributes:
         began: When it was struck, s.
         braked: From the host's death until both drives brake, s; None if a drive does not.
+        turned: Joint angles that honest encoders see, ahead of the transmissions, at every tick of
+            the lockstep's truth, rad.
     """
 
     def __init__(self, lockstep: Lockstep, scene: Scene, *, killed: bool = False) -> None:
@@ -49,6 +51,7 @@ class StruckClock:
         self._killed_after = scene.killed_after if killed else None
         self.began: float | None = None
         self.braked: float | None = None
+        self.turned: list[list[float]] = []
 
     def now(self) -> float:
         """Return the robot's time."""
@@ -70,7 +73,13 @@ class StruckClock:
                 self.braked = self._watch()
                 raise HostDiedError
             deadline += mishap.stall
-        return self._lockstep.wait_until(deadline)
+        reached, leg = self._lockstep.wait_until(deadline), robot.leg
+        seen = [
+            wire.joint_position(leg.sensed(k)[0]) / leg.wiring[k]
+            for k, wire in enumerate(leg.transforms)
+        ]
+        self.turned.append(seen)
+        return reached
 
     def _watch(self) -> float | None:
         """Let the robot move without a host; return when both drives have begun to brake."""
@@ -154,7 +163,8 @@ def _hop(scene: Scene) -> Result:
     if done is not None:
         judge_trace(result, done, scene.family)
         if scene.family.lies:
-            judge_truth(result, scene, log, np.array(lockstep.truth), done.trace)
+            truth = np.column_stack([lockstep.truth, clock.turned])
+            judge_truth(result, scene, log, truth, done.trace)
         return result
     judge_braking(result, clock.braked)
     return result

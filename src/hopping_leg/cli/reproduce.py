@@ -1,19 +1,18 @@
 """The main job: the whole paper in miniature, from a leg that is not known to hops on it.
 
-A twin plays the real leg. It is recorded, identified from the recordings, a policy is trained from
+A twin plays the real leg. It is recorded and identified, its belt too; a policy is trained from
 scratch on what was identified and hops on the twin without tuning, beside one that was trained on
 the CAD's robot and energy shaping tuned on other twins: that is said first. The paper's trials
-judge it in its own simulation, beside the shipped policies. A run that was killed goes on with the
-same command. `python -m studies.sim_to_real`, in a checkout, does it on many twins.
+judge it in its own simulation. A run that was killed goes on with the same command. In a checkout
+`python -m studies.sim_to_real` does it on many twins.
 
 Examples:
   hop reproduce --quick                         # does everything work here?
   hop reproduce
-  hop reproduce --seed 1 --out runs/second
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -39,8 +38,8 @@ _BOOM = "boom, 200 Hz", "torques as measured"
 _INERTIA_FACTOR = 10.0  # the paper's Table I has nine times the CAD's inertia of the shank
 
 NOTHING_MEANT = (
-    "This was a quick run: fit, training and trials were cut so short that its numbers mean"
-    " nothing. It shows only that every step works; leave out --quick for numbers."
+    "This was a quick run: every step works, but was cut so short that its numbers mean nothing;"
+    " leave out --quick for numbers."
 )
 
 
@@ -153,19 +152,20 @@ def _identify(recordings: "list[Recording]", believed: str, folder: Path, *, qui
     file = folder / "identified.toml"
     if file.exists():
         return str(file)
-    start = load_robot(believed)
+    origin = folder / "with-belt.toml"
+    belt = Path(__file__).with_name("with_belt.toml").read_text(encoding="utf-8")
+    io.write_atomically(origin, belt.format(believed).encode())
+    start = load_robot(str(origin))
     links = {"thigh.inertia": start.thigh.inertia, "shank.inertia": start.shank.inertia}
     bounds = {name: (v / _INERTIA_FACTOR, v * _INERTIA_FACTOR) for name, v in links.items()}
-    effort = SearchOptions(tolerance=1e-3)
-    if quick:
-        effort = replace(effort, rounds=1, evaluations=2)
-    asked = IdentifyOptions(bounds=bounds, effort=effort)
+    effort = SearchOptions(tolerance=1e-3, **({"rounds": 1, "evaluations": 2} if quick else {}))
+    asked = IdentifyOptions(("+reality.knee.stiffness",), bounds=bounds, effort=effort)
     with Progress("preparing") as bar:
         found = identify(
             recordings, start, options=asked,
             report=lambda stage, share, cost: bar.show(stage, share, f"cost {cost:.5g}"),
         )  # fmt: skip
-    save_robot(found, file, believed)
+    save_robot(found, file, str(origin))
     return str(file)
 
 

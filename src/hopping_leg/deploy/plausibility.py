@@ -137,7 +137,7 @@ class JointEvidence:
             rattles = swing * self.swing < 0 and min(abs(swing), abs(self.swing)) > _RATTLE
             if rattles or reply.velocity * last.velocity <= 0:
                 contradictions = 0
-            weight = 0.0 if rattles or self.shaken > _SHAKEN else 1.0
+            weight = 0.0 if rattles or max(abs(swing), self.shaken) > _SHAKEN else 1.0
             fading, mean = math.exp(-elapsed / _FADING), (given + self.given) / 2
             first, second, third = (
                 motor.share(torque, reply.velocity) for torque in (told, *self.told)
