@@ -142,6 +142,6 @@ def read_options(options: Any, program: str, about: str | None, words: Sequence[
     for word in words:
         listed = _LIST.fullmatch(word) and not os.path.exists(word)  # noqa: PTH110
         apart += word.split(",") if listed else [word]
-    if "--no-video" in apart:  # in scripts from when evaluations made videos
+    if "--no-video" in apart:  # asked of evaluations, which make none
         apart.remove("--no-video")
     return tyro.cli(options, prog=program, description=about, args=apart, config=_CONFIG)

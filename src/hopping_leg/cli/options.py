@@ -31,7 +31,7 @@ def at_least(least: int, **values: int | None) -> None:
     """Refuse options below their least sensible value; None is an option that was not given."""
     for name, value in values.items():
         if value is not None and value < least:
-            raise UsageError(f"--{name.replace('_', '-')} is {value}, must be {least} or more.")
+            raise UsageError(f"--{name.replace('_', '-')} is {value} but must be {least} or more.")
 
 
 def save_json(path: Path | None, value: object) -> None:
