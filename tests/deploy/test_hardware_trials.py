@@ -6,6 +6,7 @@ import itertools
 import os
 import threading
 import time
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -241,14 +242,14 @@ def test_the_flight_recording_goes_only_once_the_trace_is_whole(tmp_path, monkey
 
 
 def test_a_trace_that_cannot_be_written_names_the_stop_and_the_next_command(tmp_path, monkeypatch):
-    def full(self, path):
-        raise PanicException("No space left on device.")
-
-    monkeypatch.setattr(Trace, "save", full)
+    monkeypatch.setattr(Trace, "save", Mock(side_effect=(PanicException("Bad"), KeyboardInterrupt)))
     controller = Still()
     controller.act = lambda measurement: 1 / 0
     _, _, run = fake_run(tmp_path, controller)
-    with pytest.raises(TraceError, match=r"raised an error.*No space.*blackbox` writes"):
+    with pytest.raises(TraceError, match=r"raised an error.*Bad.*blackbox` writes"):
+        run()
+    (tmp_path / "run.blackbox").unlink()
+    with pytest.raises(KeyboardInterrupt):
         run()
     assert recover(tmp_path / "run.blackbox").table.height > 50
 

@@ -15,6 +15,8 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from polars.exceptions import PanicException
+
 from hopping_leg import flight_recording
 from hopping_leg.controllers import protocol
 from hopping_leg.controllers.fallback import Fallback
@@ -167,7 +169,7 @@ def _finish(
             trace.header["events"].append({"record": complaint or notice})
         trace.save(path)
         whole = Trace.load(path).table.height == recorder.rows
-    except BaseException as error:  # polars panics where it can open nothing more
+    except (Exception, PanicException) as error:  # polars panics where it can open no more
         raise TraceError(
             f"The run is over: {outcome.supervisor.stop_cause} {complaint} {error} What the disk"
             f" took is in {kept}; once there is room, `{_draw(kept)}` writes the trace."
