@@ -9,14 +9,13 @@ import polars as pl
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.protocol import Controller
-from hopping_leg.errors import PhysicsError, UsageError
+from hopping_leg.errors import UsageError
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.robot import TIMESTEP, Robot, SoftLimits, kinematics
 from hopping_leg.sim import CONTROL_RATE, LOADS, LegSimulator, NoiseAndDelay, Plant
 from hopping_leg.trace import COLUMNS, Trace
 
 _START_SHARE = 0.2 / 0.29  # leg length of the standing start as a share of the straight leg's
-_IMPOSSIBLE = 1e4  # joint speed that no leg reaches, rad/s
 
 _COLUMNS = (*list(COLUMNS)[2:], "command_m", "hip_soft_limit_nm", "knee_soft_limit_nm", *LOADS)
 """Columns of a rollout, which its loop fills by their places."""
@@ -147,11 +146,7 @@ def rollout(
         row[14:16], row[16:] = plant.soft_limit_torque.T, legs.records["loads"].T
         if on_tick is not None:
             on_tick(tick + 1, ticks)
-    if not np.abs(data[4:6]).max() < _IMPOSSIBLE:
-        raise PhysicsError(
-            f"The simulation of {config.robot.name} became unstable at a physics step of"
-            f" {config.timestep:g} s; take a smaller one or check masses and inertias."
-        )
+    legs.require_stable(data[4:6])
     header = {
         "robot": config.robot.name,
         "robot_digest": config.robot.digest,

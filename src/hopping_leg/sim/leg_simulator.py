@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array, IntArray, Records
-from hopping_leg.errors import UsageError
+from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.robot import CONTROL_RATE, TIMESTEP, Robot, kinematics
 from hopping_leg.sim import stepper
 from hopping_leg.sim.compiled import announce
 from hopping_leg.sim.lanes import WIDTH
 from hopping_leg.sim.leg_table import LEG, leg_geometry, leg_table
 
+IMPOSSIBLE_SPEED = 1e4  # Joint speed that no leg reaches, rad/s
 _STEPS_PER_THREAD = 4000  # Physics steps for which it is worth waking another thread
 
 
@@ -178,6 +179,14 @@ class LegSimulator:
         )  # fmt: skip
         self.read_sensors()
         return self.records["mean_torque"].copy()
+
+    def require_stable(self, qd: Array) -> None:
+        """Raise PhysicsError if joints had a speed, rad/s, that no leg reaches."""
+        if not np.abs(qd).max() < IMPOSSIBLE_SPEED:
+            raise PhysicsError(
+                f"The simulation of {self.robot.name} became unstable at a physics step of"
+                f" {self.timestep:g} s; take a smaller one, or check gains, masses and inertias."
+            )
 
     def read_sensors(self) -> None:
         """Let the sensors report anew, with other noise; a step ends with it."""

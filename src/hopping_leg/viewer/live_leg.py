@@ -10,6 +10,7 @@ from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import Robot, SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, LegSimulator, Measurement, NoiseAndDelay, Plant
+from hopping_leg.sim.leg_simulator import IMPOSSIBLE_SPEED
 from hopping_leg.viewer.tracks import FIELDS, KEPT, MOST, Track
 
 PUSH_SECONDS = 0.05  # How long a push lasts
@@ -57,7 +58,6 @@ def default_settings(robot: Robot) -> LiveSettings:
 
 
 _ALL = slice(None)
-_IMPOSSIBLE = 1e4  # Joint speed that no leg reaches, rad/s
 
 
 class LiveSimulation:
@@ -103,7 +103,7 @@ class LiveSimulation:
         ]
         rows[5:7] = self._plant.drive(np.concatenate(torques)).T
         for leg, track in enumerate(self.tracks):
-            if np.abs(legs.qd[leg]).max() < _IMPOSSIBLE:
+            if np.abs(legs.qd[leg]).max() < IMPOSSIBLE_SPEED:
                 track.extend(np.array([self.now]), rows[:, leg : leg + 1])
             else:
                 self.notices.append(f"{track.name} became unstable. The leg stands up again.")
