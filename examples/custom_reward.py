@@ -12,6 +12,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.envs import RewardTerm, Transition
 from hopping_leg.rl.recipes.paper import PAPER
+from hopping_leg.rl.run_folder import read_result
 from hopping_leg.rl.train import train
 from hopping_leg.robot import load_robot
 
@@ -30,5 +31,6 @@ if __name__ == "__main__":
     if (folder / "policy.onnx").exists():
         print(f"{folder} holds a finished training; delete it to train again.")
     else:
-        trained = train(recipe, load_robot(recipe.robot), 0, folder, resume=folder.exists())
-        print(f"{trained.steps} steps in {trained.minutes:.1f} minutes: {trained.policy}")
+        policy = train(recipe, load_robot(recipe.robot), 0, folder, resume=folder.exists())
+        result = read_result(folder)
+        print(f"{result['steps']} steps in {result['minutes']:.1f} minutes: {policy}")

@@ -13,6 +13,7 @@ import numpy as np
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.rl.recipes.fast import FAST
+from hopping_leg.rl.run_folder import read_result
 from hopping_leg.rl.train import train
 from hopping_leg.robot import load_robot
 
@@ -24,8 +25,9 @@ file = folder / "policy.onnx"
 if file.exists():
     print(f"{folder} holds a finished training; {file} is used.")
 else:
-    trained = train(recipe, leg, 0, folder, resume=folder.exists())
-    print(f"{trained.steps} steps in {trained.minutes:.1f} minutes: {file}")
+    train(recipe, leg, 0, folder, resume=folder.exists())
+    result = read_result(folder)
+    print(f"{result['steps']} steps in {result['minutes']:.1f} minutes: {file}")
 
 policy = load_controller(str(file), leg)
 run = rollout(policy, RolloutConfig(leg), np.full((1000, 4), 0.30), seed=0)

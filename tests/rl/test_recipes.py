@@ -11,10 +11,8 @@ from hopping_leg.rl.recipes import change, get_recipe, randomise, settings_of
 from hopping_leg.rl.run_folder import MISSED, RunFolder, missed_commands
 from hopping_leg.robot import load_robot, shipped_robots
 
-LEGS = [load_robot(name) for name in shipped_robots()]
-LEGS = [
-    robot for robot in LEGS if robot.kind == "leg" and robot.reality == robot.reality.in_training
-]
+LEGS = [leg for leg in map(load_robot, shipped_robots()) if leg.kind == "leg"]
+LEGS = [leg for leg in LEGS if leg.reality == leg.reality.in_training]
 every_leg = pytest.mark.parametrize("robot", LEGS, ids=lambda robot: robot.name)
 
 

@@ -23,8 +23,8 @@ def test_a_leg_with_a_belt_and_jitter_is_trained_on_as_its_motors_see_it(tmp_pat
     np.testing.assert_array_equal(legs.measured_q, legs.records["rotor"][:, :2])
     assert np.abs(legs.measured_q - legs.q)[:, 1].max() > 1e-3
     try_briefly(monkeypatch)
-    trained = train(TINY_FAST, belted, 0, tmp_path, quiet=True)
-    assert Policy.load(trained.policy).card.robot_digest == belted.digest
+    policy = train(TINY_FAST, belted, 0, tmp_path, quiet=True)
+    assert Policy.load(policy).card.robot_digest == belted.digest
     with pytest.raises(RobotError, match="beyond transmissions"):
         train(TINY_FAST, replace_at(belted, "reality.knee.ripple", 0.1), 0, tmp_path)
 
@@ -35,9 +35,9 @@ def test_a_run_is_known_by_what_was_asked_and_its_card_says_what_is_in_reach(tmp
 
     try_briefly(monkeypatch)
     monkeypatch.setattr(reach, "within_reach", within_reach)
-    trained = train(TINY_FAST, ROBOT, 0, tmp_path, quiet=True)
+    policy = train(TINY_FAST, ROBOT, 0, tmp_path, quiet=True)
     RunFolder(tmp_path, TINY_FAST.fit(ROBOT), ROBOT, 0, None).check_same()
-    card = Policy.load(trained.policy).card
+    card = Policy.load(policy).card
     assert (card.command_low, card.command_high) == (0.28, 0.30)
     told = (tmp_path / "model_card.md").read_text()
     assert "\namong them the age of each joint sample, which the paper's 15 lack" in told

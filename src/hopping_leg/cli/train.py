@@ -82,7 +82,7 @@ def run(args: Options) -> None:
     recipe = recipe.replace(heights=args.heights)
     out = args.out or Path("runs") / f"{recipe.name}-seed{args.seed}"
     try:
-        trained = train(
+        policy = train(
             recipe, load_robot(args.robot or recipe.robot), args.seed, out,
             resume=args.resume, minutes=args.minutes, threads=args.threads, ray=args.ray,
             command=COMMAND.get(),
@@ -90,6 +90,6 @@ def run(args: Options) -> None:
     except (KeyboardInterrupt, OSError, TraceError):
         print(f"Stopped; the same command with --resume goes on in {out}.", file=sys.stderr)
         raise
-    say(trained.policy.with_name("model_card.md").read_text(encoding="utf-8"))
-    say(f"Policy: {trained.policy}")
-    save_json(args.json, read_result(trained.policy.parent))
+    say(policy.with_name("model_card.md").read_text(encoding="utf-8"))
+    say(f"Policy: {policy}")
+    save_json(args.json, read_result(policy.parent))

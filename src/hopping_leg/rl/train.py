@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,18 +26,6 @@ _RANGE_LEGS, _RANGE_STRIDE = 24, 5
 """Legs of any size whose hops tell a policy's range of inputs, and which of their heights do."""
 
 
-@dataclass(frozen=True)
-class Trained:
-    """A finished training."""
-
-    policy: Path
-    """The selected policy file, in the run's folder."""
-    minutes: float
-    """Wall-clock time of the training, pauses excluded."""
-    steps: int
-    """Control steps of experience."""
-
-
 def train(
     recipe: Recipe,
     robot: Robot,
@@ -50,8 +38,10 @@ def train(
     quiet: bool = False,
     ray: str | None = None,
     command: str = "hopping_leg.rl.train",
-) -> Trained:
-    """Train a controller, scaled to the robot's size; leave policy, card and history in ``out``.
+) -> Path:
+    """Train a controller, scaled to the robot's size; return the policy's file.
+
+    Beside it in ``out`` are its card and history, see ``run_folder.read_result``.
 
     A run that was killed at any moment continues with ``resume`` as if nothing had happened; with
     ``minutes`` that holds up to the clock, which the learning rate then follows.
@@ -145,7 +135,7 @@ class Trainer:
             ) from error
         self._began = time.monotonic()
 
-    def run(self, command: str) -> Trained:
+    def run(self, command: str) -> Path:
         """Learn until steps or time are used up; write the selected policy."""
         learner, schedule = self.learner, self.recipe.schedule
         if self.tick() and learner.num_timesteps < schedule.steps:
@@ -155,13 +145,12 @@ class Trainer:
         self._progress.show(self._title, 1.0, about=", selecting and calibrating")
         with self._timed("selection and calibration"):
             content, selected = self._finish()
-        minutes, steps = self.elapsed / 60, int(learner.num_timesteps)
         result = {
             **self.folder.config,
             "command": command,
             "command_bounds": self.recipe.task.command_bounds,
-            "minutes": minutes,
-            "steps": steps,
+            "minutes": self.elapsed / 60,
+            "steps": int(learner.num_timesteps),
             "selected": selected,
             "history": self.selection.rows,
             "seconds": self.seconds | learner.seconds,
@@ -170,7 +159,7 @@ class Trainer:
         card = run_folder.model_card(result).encode()
         write_atomically(self.folder.path / "model_card.md", card)
         Policy(content, "the selected policy", self.recipe.name).save(self.folder.policy)
-        return Trained(self.folder.policy, minutes, steps)
+        return self.folder.policy
 
     def _finish(self) -> tuple[bytes, dict[str, Any]]:
         """Return the selected policy, calibrated, and how it hops, as JSON values."""
