@@ -99,7 +99,8 @@ def _serve(start: EmulatorConfig, pipe: Connection) -> None:
     """Run in the process: serve the terminal until the pipe is closed."""
     try:
         robot, port = start.build(), PtyPort(start.link)
-        robot.observer = log = WireLog()
+        log = WireLog()
+        robot.on_message, robot.on_mode = log.record, log.record_mode
     except Exception as error:
         pipe.send(str(error))
         return

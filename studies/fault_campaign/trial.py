@@ -118,7 +118,7 @@ def play(case: Case, family: Family, robot: Robot) -> Result:
 def _logged(scene: Scene) -> tuple[Lockstep, WireLog]:
     """Return the robot of a trial and the log of its wire."""
     lockstep, log = Lockstep(scene.emulate(), checksums=scene.checksums), WireLog()
-    lockstep.robot.observer = log
+    lockstep.robot.on_message, lockstep.robot.on_mode = log.record, log.record_mode
     return lockstep, log
 
 

@@ -6,9 +6,8 @@ Time comes as an argument. Nothing here knows of sockets, terminals or the clock
 import hashlib
 import math
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 from moteus.protocol import Register
@@ -28,16 +27,6 @@ _MODEL = 0x0000  # Board r4
 _FIRMWARE = 0x010D  # Firmware version in its binary-coded form
 _ALL_VALID = {Register.ENCODER_VALIDITY: 0b111111}
 _AIRBORNE = 0.01  # Height of the foot in a flight that counts as the first, m: no bounce
-
-
-class Observer(Protocol):
-    """Who is told what goes over the wire; times in s, joint 0 is the hip, 1 the knee."""
-
-    def record(self, time: float, joint: int, message: bus.Message, answer: Frame | None) -> None:
-        """Take what the host sent to a drive, and the drive's answer."""
-
-    def record_mode(self, time: float, joint: int, mode: DriveMode) -> None:
-        """Take a drive's mode after a step."""
 
 
 class EmulatedRobot:
@@ -68,7 +57,10 @@ class EmulatedRobot:
         self.reply_queue = TimedQueue[QueuedReply]()  # What is on its way to the host
         self.wire_time = 0.0  # What a reply takes at least, s
         self.plugged = True  # Whether the adapter is plugged in
-        self.observer: Observer | None = None  # Of what goes over the wire
+        self.on_message: Callable[[float, int, bus.Message, Frame | None], None] = lambda *_: None
+        """Told the time, s, a drive (0 hip, 1 knee), what the host sends to it, and its answer."""
+        self.on_mode: Callable[[float, int, DriveMode], None] = lambda *_: None
+        """Told the time, s, and a drive's mode, after every step."""
         self._sense()
         self.fault_injector = FaultInjector(self, faults, self._rng)
 
@@ -97,8 +89,7 @@ class EmulatedRobot:
             if not late:
                 bus.act(message, drive, self.time)
             answer = bus.answer(message, drive)
-            if self.observer is not None:
-                self.observer.record(self.time, joint, message, answer)
+            self.on_message(self.time, joint, message, answer)
             if answer is not None:
                 self.fault_injector.send(answer, joint)
 
@@ -124,8 +115,7 @@ class EmulatedRobot:
             self.drives[JOINTS.index(sensor.drive)].sensed = reading | _ALL_VALID
         for joint, drive in enumerate(self.drives):
             drive.update_sensors(*self.leg.sensed(joint))
-            if self.observer is not None:
-                self.observer.record_mode(self.time, joint, drive.machine.mode)
+            self.on_mode(self.time, joint, drive.machine.mode)
 
 
 def _drive(robot: Robot, joint: int, configured: bool) -> EmulatedDrive:
