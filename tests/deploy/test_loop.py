@@ -299,8 +299,6 @@ def test_a_controller_that_changes_what_it_is_given_changes_nothing_else(tmp_pat
 
     traces = []
     for name, controller in (("plain", Still((0.5, 0.5))), ("changing", Changing((0.5, 0.5)))):
-        (tmp_path / name).mkdir()
-        loop, link, _ = make_loop(tmp_path / name, controller)
-        loop.run()
+        _, link, _ = run(tmp_path / name, controller)
         traces.append([told.torque for told in link.told])
     assert traces[0] == traces[1]

@@ -9,7 +9,7 @@ from tests.robot.legs import SEEDS, posed, random_robot, random_state
 
 @settings(max_examples=40)
 @given(SEEDS)
-def test_mass_matrix_and_forces_agree_with_mujoco(seed):
+def test_dynamics_kinematics_and_clearances_agree_with_mujoco(seed):
     rng = np.random.default_rng(seed)
     robot = random_robot(rng)
     height, rate, q, qd = random_state(rng)
@@ -22,6 +22,23 @@ def test_mass_matrix_and_forces_agree_with_mujoco(seed):
     still = posed(model, height, 0 * rate, q, 0 * qd)
     gravity = dynamics.gravity_force(robot, q)[0]
     np.testing.assert_allclose(gravity, still.qfrc_bias, rtol=1e-7, atol=1e-9)
+    foot = data.site("foot").xpos
+    down, forward = kinematics.foot_position(robot, q)[0]
+    np.testing.assert_allclose([height[0] - down, forward], foot[[2, 0]], atol=1e-12)
+    bottom = {
+        "foot": kinematics.foot_clearance(robot, height, q),
+        "knee_cap": kinematics.knee_clearance(robot, height, q),
+        "base": kinematics.base_clearance(robot, height),
+    }
+    for name, clearance in bottom.items():
+        geom = model.geom(name).id
+        gap = mujoco.mj_geomDistance(model, data, model.geom("floor").id, geom, 10.0, None)
+        np.testing.assert_allclose(clearance[0], gap, atol=1e-9)
+    jacobian = np.zeros((3, 3))
+    mujoco.mj_jacSite(model, data, jacobian, None, model.site("foot").id)
+    velocity = jacobian @ data.qvel
+    rates = kinematics.foot_velocity(robot, q, qd)[0]
+    np.testing.assert_allclose([rate[0] - rates[0], rates[1]], velocity[[2, 0]], atol=1e-9)
 
 
 angles = st.tuples(st.floats(-3.1, 3.1), st.floats(-3.1, -0.02)).map(np.array)
@@ -44,33 +61,6 @@ def test_a_foot_out_of_reach_has_no_angles(distance, direction):
     robot = load_robot("legv2")
     foot = distance * np.array([np.cos(direction), np.sin(direction)])
     assert np.isnan(kinematics.joint_angles(robot, foot)).all()
-
-
-@settings(max_examples=25)
-@given(SEEDS)
-def test_foot_and_clearances_agree_with_mujoco(seed):
-    rng = np.random.default_rng(seed)
-    robot = random_robot(rng)
-    height, rate, q, qd = random_state(rng)
-    model = build_model(robot)
-    data = posed(model, height, rate, q, qd)
-    foot = data.site("foot").xpos
-    down, forward = kinematics.foot_position(robot, q)[0]
-    np.testing.assert_allclose([height[0] - down, forward], foot[[2, 0]], atol=1e-12)
-    bottom = {
-        "foot": kinematics.foot_clearance(robot, height, q),
-        "knee_cap": kinematics.knee_clearance(robot, height, q),
-        "base": kinematics.base_clearance(robot, height),
-    }
-    for name, clearance in bottom.items():
-        geom = model.geom(name).id
-        gap = mujoco.mj_geomDistance(model, data, model.geom("floor").id, geom, 10.0, None)
-        np.testing.assert_allclose(clearance[0], gap, atol=1e-9)
-    jacobian = np.zeros((3, 3))
-    mujoco.mj_jacSite(model, data, jacobian, None, model.site("foot").id)
-    velocity = jacobian @ data.qvel
-    rates = kinematics.foot_velocity(robot, q, qd)[0]
-    np.testing.assert_allclose([rate[0] - rates[0], rates[1]], velocity[[2, 0]], atol=1e-9)
 
 
 def test_smooth_step_rate_is_its_derivative():

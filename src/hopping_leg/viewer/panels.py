@@ -102,8 +102,9 @@ class LivePanel:
         self._live, gui = live, inputs.gui
         hint = "Commanded apex; keys K and J"
         self._height = inputs.slider(
-            "Height, m", live.valid, HEIGHT_STEP, live.height, self._set_height, hint
-        )
+            "Height, m", live.valid, HEIGHT_STEP, live.height,
+            lambda: live.set_height(self._height.value), hint,
+        )  # fmt: skip
         inputs.key("Higher", "K", lambda: self._change(KEY_STEP))
         inputs.key("Lower", "J", lambda: self._change(-KEY_STEP))
         names = self._names = tuple(dict.fromkeys((*controller_names(), *live.names)))
@@ -127,9 +128,6 @@ class LivePanel:
             up, down = viser.Icon.ARROW_UP, viser.Icon.ARROW_DOWN
             inputs.button("Push up", "P", up, lambda: live.push(force.value))
             inputs.button("Push down", "O", down, lambda: live.push(-force.value))
-
-    def _set_height(self) -> None:
-        self._live.set_height(self._height.value)
 
     def _change(self, by: float) -> None:
         self._height.value = self._live.set_height(self._live.height + by)

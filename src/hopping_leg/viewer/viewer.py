@@ -46,7 +46,10 @@ class Viewer:
 
     def __init__(self, source: Source, *, port: int = 8080) -> None:
         self._source = source
-        self._server = _serve(port)
+        if not 0 <= port < 65536:
+            raise UsageError(f"--port is {port} but must lie between 0 and 65535.")
+        with contextlib.redirect_stdout(io.StringIO()), _guarded():
+            self._server = viser.ViserServer(host=_HOST, port=port, verbose=False)
         self.address = f"http://{_HOST}:{self._server.get_port()}"
         self.clock = panels.PlaybackClock(1 / CONTROL_RATE)
         self._inputs = panels.Inputs(self._server)
@@ -120,13 +123,6 @@ class Viewer:
             lines += [html.escape(track.note)] if track.note else []
         lines += [f'<span style="color:#77767b">{source.now:.2f} s</span>']
         return f'<div style="padding:0.4em 1em;line-height:1.5">{"<br>".join(lines)}</div>'
-
-
-def _serve(port: int) -> viser.ViserServer:
-    if not 0 <= port < 65536:
-        raise UsageError(f"--port is {port} but must lie between 0 and 65535.")
-    with contextlib.redirect_stdout(io.StringIO()), _guarded():
-        return viser.ViserServer(host=_HOST, port=port, verbose=False)
 
 
 def answer(
