@@ -117,6 +117,21 @@ def test_an_imported_leg_is_checked_and_what_was_assumed_is_listed(tmp_path, mon
     assert "assumed: unknown until identified" in (tmp_path / "a leg.toml").read_text()
 
 
+def test_a_terminal_is_asked_where_the_foot_is_and_nobody_else(tmp_path, monkeypatch, refused):
+    text, file = (ROOT / "examples/leg.urdf").read_text(), tmp_path / "leg.urdf"
+    file.write_text(text.replace("0 0 -0.165", "0 0.03 0"))
+    words = ["robots", "import", str(file), "--motor", "qdd100", "--out", f"{tmp_path}/leg.toml"]
+    refused(words, "stand foot, lower_leg, below it only the shank's centre of mass")
+    typed = Mock(side_effect=["", "20 cm\n", "0.2\n"])
+    monkeypatch.setattr("sys.stdin", Mock(isatty=lambda: True, readline=typed))
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    refused(words, "give the foot's distance through it")
+    refused(words, "give a number in m")
+    assert main(words) == 0
+    shank = load_robot(tmp_path / "leg.toml").shank
+    assert (shank.length, shank.com) == (0.2, pytest.approx(0.07 * 0.13 / 0.148, rel=1e-3))
+
+
 def test_urdf_is_written_to_a_file_or_printed(tmp_path, capsys):
     file = tmp_path / "leg.urdf"
     assert main(["export", "urdf", "--out", str(file)]) == main(["export", "urdf"]) == 0

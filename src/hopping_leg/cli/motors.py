@@ -1,11 +1,10 @@
 """What the verbs that talk to motors share; the client library is imported only here, and late."""
 
 import contextlib
-import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from hopping_leg.cli.options import say, show_table
+from hopping_leg.cli.options import answer, say, show_table
 from hopping_leg.deploy import preflight
 from hopping_leg.deploy.safety_limits import SafetyLimits
 from hopping_leg.errors import UsageError
@@ -44,9 +43,9 @@ def ask(question: str, *, yes: bool) -> None:
     """Ask the operator, unless ``yes``; UsageError if nobody can be asked or the answer is no."""
     if yes:
         return
-    if not sys.stdin.isatty():
+    if (said := answer(f"{question} Type yes:")) is None:
         raise UsageError(f"{question} This needs your consent; call it in a terminal or add --yes.")
-    if input(f"{question} Type yes: ").strip().lower() not in ("y", "yes"):
+    if said.lower() not in ("y", "yes"):
         raise UsageError("You did not agree; nothing was done.")
 
 

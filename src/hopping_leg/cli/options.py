@@ -1,5 +1,6 @@
 """What verbs share: types and checks of options, printed lines and tables."""
 
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
@@ -38,6 +39,14 @@ def save_json(path: Path | None, value: object) -> None:
     """Write a result if a file was named."""
     if path is not None:
         io.write_json(path, value)
+
+
+def answer(question: str) -> str | None:
+    """Return what the user types on the terminal, None where there is none to ask on."""
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return None
+    print(question, end=" ", file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip()
 
 
 def say(*lines: object) -> None:

@@ -17,11 +17,11 @@ from typing import Annotated, Literal
 
 import tyro
 
-from hopping_leg.cli.options import at_least, say, show_table
+from hopping_leg.cli.options import answer, at_least, say, show_table
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import Robot, build_model, importing, numbers, robot_files
-from hopping_leg.robot.planar_leg import read_leg
+from hopping_leg.robot.planar_leg import NoFootError, read_leg
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,14 @@ def _import(args: Import) -> None:
     if out.exists():
         raise UsageError(f"{out} exists and is not replaced; remove it, or give another --out.")
     values = importing.read_values(args.set)
-    leg = read_leg(args.description, args.hip, args.knee, args.foot, values.get("shank.length"))
+    names = args.description, args.hip, args.knee, args.foot
+    try:
+        leg = read_leg(*names, values.get("shank.length"))
+    except NoFootError as error:
+        if not (said := answer(f"{error}\nLength of the shank, from knee to foot, in m:")):
+            raise
+        values |= importing.read_values((f"shank.length={said}",))
+        leg = read_leg(*names, values["shank.length"])
     tree, comment = importing.imported_robot(leg, str(args.description), args.motor, values)
     robot = robot_files.robot_from_tree(tree, str(out))
     build_model(robot)

@@ -51,6 +51,10 @@ class PlanarLeg:
     """Sentences on what the file hardly means."""
 
 
+class NoFootError(RobotError):
+    """A file does not say where the foot is; its distance from the knee would."""
+
+
 def read_leg(
     path: Path, hip: str | None = None, knee: str | None = None,
     foot: str | None = None, shank_length: float | None = None,
@@ -62,7 +66,7 @@ def read_leg(
     lies ``shank_length``, m, from the knee, through the shank's centre of mass.
 
     RobotError says that the file cannot be read, that a part is missing or ambiguous, or that the
-    leg moves in no vertical plane.
+    leg moves in no vertical plane; NoFootError that the foot is missing.
     """
     tree = Description(path)
     data, body_of = tree.data, tree.model.jnt_bodyid
@@ -178,7 +182,7 @@ def _foot(
     if length and com > _SAME_PLACE:
         return Point(_THROUGH, knees + length / com * line, 0.0)
     found = ", ".join(sorted({point.name for point in points}))
-    raise RobotError(
+    raise NoFootError(
         f"{tree.origin} does not say where the foot is: on the knee's axis stand {found}, below it"
         f" only the shank's centre of mass, {com:.3g} m away; give the foot's distance through it,"
         " e.g. --set shank.length=0.2, or add a frame at its centre and name it with --foot."
