@@ -1,5 +1,6 @@
 import pytest
 
+from hopping_leg.cli.doctor import missing
 from tests.extras import TRAINING, run_without
 
 OPTIONAL = [*TRAINING, "ray", "moteus", "can", "serial", "viser", "playwright", "mcap", "mcap_ros2"]
@@ -24,3 +25,7 @@ def test_the_core_says_what_there_is_and_which_extra_a_verb_needs(words, exit_co
     assert done.returncode == exit_code, done.stderr
     assert said in (done.stderr if exit_code else done.stdout)
     assert "Traceback" not in done.stderr
+
+
+def test_what_a_system_cannot_do_is_said_where_it_cannot():
+    assert [len(missing(system)) for system in ("linux", "darwin", "win32")] == [0, 1, 2]

@@ -9,6 +9,7 @@ Examples:
   hop doctor --transport socketcan:can0 --home 0.0 0.0     # the leg hangs straight down
 """
 
+import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -82,6 +83,14 @@ def compile_everything() -> None:
     env.reset(seed=0)
     env.step(np.zeros(2, np.float32))
     options.say(f"compiled code: {FOLDER or 'no folder can be written; lost with each process'}")
+    options.say(*missing(sys.platform))
+
+
+def missing(system: str) -> tuple[str, ...]:
+    """Return a line on each thing that a system, named as Python does, cannot do."""
+    late = f"Not on {system}: real-time priority, locked memory, socketcan; ticks may be late."
+    none = f"Not on {system}: fdcanusb, `hop emulate`, `hop deploy`, `hop record play --transport`."
+    return {"linux": (), "darwin": (late,)}.get(system, (late, none))
 
 
 def _write(
