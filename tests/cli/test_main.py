@@ -122,8 +122,9 @@ def test_a_terminal_is_asked_where_the_foot_is_and_nobody_else(tmp_path, monkeyp
     file.write_text(text.replace("0 0 -0.165", "0 0.03 0"))
     words = ["robots", "import", str(file), "--motor", "qdd100", "--out", f"{tmp_path}/leg.toml"]
     refused(words, "stand foot, lower_leg, below it only the shank's centre of mass")
-    typed = Mock(side_effect=["", "20 cm\n", "0.2\n"])
-    monkeypatch.setattr("sys.stdin", Mock(isatty=lambda: True, readline=typed))
+    typed = iter(["\n", "20 cm\n", "0.2\n"])
+    echo = Mock(isatty=lambda: True, readline=lambda: print(file=sys.stderr) or next(typed))
+    monkeypatch.setattr("sys.stdin", echo)
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
     refused(words, "give the foot's distance through it")
     refused(words, "give a number in m")

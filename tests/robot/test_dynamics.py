@@ -14,7 +14,7 @@ def test_dynamics_kinematics_and_clearances_agree_with_mujoco(seed):
     robot = random_robot(rng)
     height, rate, q, qd = random_state(rng)
     model = build_model(robot)
-    data, full = posed(model, height, rate, q, qd), np.zeros((3, 3))
+    data, (full, jacobian) = posed(model, height, rate, q, qd), np.zeros((2, 3, 3))
     mujoco.mj_fullM(model, data, full)
     np.testing.assert_allclose(dynamics.mass_matrix(robot, q)[0], full, rtol=1e-7, atol=1e-9)
     bias = dynamics.bias_force(robot, q, qd)[0]
@@ -34,7 +34,6 @@ def test_dynamics_kinematics_and_clearances_agree_with_mujoco(seed):
         geom = model.geom(name).id
         gap = mujoco.mj_geomDistance(model, data, model.geom("floor").id, geom, 10.0, None)
         np.testing.assert_allclose(clearance[0], gap, atol=1e-9)
-    jacobian = np.zeros((3, 3))
     mujoco.mj_jacSite(model, data, jacobian, None, model.site("foot").id)
     velocity = jacobian @ data.qvel
     rates = kinematics.foot_velocity(robot, q, qd)[0]
