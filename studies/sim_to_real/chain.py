@@ -8,7 +8,6 @@ from typing import Any
 
 from hopping_leg.cli.options import Heights, JsonFile, at_least
 from hopping_leg.controllers.energy_shaping.gains import load_gains
-from hopping_leg.controllers.registry import ENERGY_SHAPING
 from hopping_leg.evaluate import runner
 from hopping_leg.rl.recipes import get_recipe, randomise
 from hopping_leg.robot import load_robot
@@ -37,8 +36,8 @@ class Experiment:
     twins need 20."""
     methods: tuple[str, ...] = DEFAULT
     """What policies are trained on, the others being compared with the first. Valid: identified,
-    identified-belt, cad, table-1, truth, randomised, whose legs differ in training; and, not
-    trained, energy-shaping-identified, universal, universal-identified. energy-shaping and
+    identified-belt, two-pass, cad, table-1, truth, randomised, whose legs differ in training; and,
+    not trained, energy-shaping-identified, universal, universal-identified. energy-shaping and
     energy-shaping-tuned hop beside them."""
     seeds: tuple[int, ...] = (0,)
     """Seeds of the trainings, one of each method and twin each."""
@@ -98,13 +97,13 @@ class Chain:
         """Return the robot that a method simulates for a twin: its name or file."""
         if method.truth:
             return twin.source
-        if method.fitted:
-            return str(self._fit(twin, belt=method.belt))
+        if method.fit:
+            return str(self._fit(twin, method))
         return method.robot or twin.believed
 
     def identify(self) -> list[Row]:
         """Record the twins and identify them, if a method asks for it; return the fits."""
-        kinds = sorted({method.belt for method in self.methods if method.fitted})
+        kinds = {_fit_name(method): method for method in self.methods if method.fit}
         if not kinds:
             return []
         seconds = self.asked.seconds
@@ -123,16 +122,17 @@ class Chain:
         )  # fmt: skip
         digests = {key: row["digest"] for key, row in zip(files, recorded, strict=True)}
         jobs = []
-        for twin, belt in ((t, b) for t in self.twins for b in kinds):
+        for twin, method in ((t, m) for t in self.twins for m in kinds.values()):
             pair = [(twin, rig) for rig in steps.RIGS]
             asked = {
                 "believed": load_robot(twin.believed).digest,
                 "recordings": [digests[key] for key in pair],
-                **({"belt": PLAY} if belt else {}),
+                **({"belt": PLAY} if method.belt else {}),
+                **({"search": method.fit} if method.fit != "least-squares" else {}),
             }
-            file = self._fit(twin, belt=belt)
-            recordings = [files[key] for key in pair]
-            jobs.append((file.with_suffix(".json"), asked, steps.fit, twin, recordings, file, belt))
+            file, recordings = self._fit(twin, method), [files[key] for key in pair]
+            fit = twin, recordings, file, method.fit, method.belt
+            jobs.append((file.with_suffix(".json"), asked, steps.fit, *fit))
         return do_all(jobs, self.asked.jobs)
 
     def train(self) -> list[Row]:
@@ -156,7 +156,7 @@ class Chain:
         robot = simulated(source, belt=method.belt)
         asked = {"recipe": repr(recipe), "robot": robot.digest, "seed": seed}
         name = f"{twin.name}-{method.name}"
-        if not method.fitted and not method.truth:
+        if not method.fit and not method.truth:
             name = Path(source).stem + ("" if method.ranges == "none" else f"-{method.ranges}")
         mark = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:8]
         folder = self._file("training", f"{name}-seed{seed}-{mark}")
@@ -167,7 +167,7 @@ class Chain:
         source = self.source(twin, method)
         asked = {
             "robot": load_robot(source).digest,
-            "start": asdict(load_gains(ENERGY_SHAPING).gains),
+            "start": asdict(load_gains(steps.TUNE.start).gains),
             "search": repr(steps.TUNE),
         }
         folder = self._file("gains", f"{twin.name}-{method.name}")
@@ -201,8 +201,15 @@ class Chain:
             for row in tried["rows"]
         ]
 
-    def _fit(self, twin: Twin, *, belt: bool) -> Path:
-        return self._file("robots", f"{twin.name}-identified{'-belt' if belt else ''}.toml")
+    def _fit(self, twin: Twin, method: Method) -> Path:
+        return self._file("robots", f"{twin.name}-{_fit_name(method)}.toml")
 
     def _file(self, kind: str, name: str) -> Path:
         return self.asked.folder / kind / name
+
+
+def _fit_name(method: Method) -> str:
+    """Return what distinguishes the fits of a twin."""
+    if method.fit != "least-squares":
+        return method.fit
+    return "identified-belt" if method.belt else "identified"

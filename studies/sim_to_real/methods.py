@@ -15,7 +15,8 @@ class Method:
     Attributes:
         name: On the command line and in the results.
         meaning: A phrase for tables.
-        fitted: Whether the robot is the twin as it is identified from recordings.
+        fit: Search that identifies the twin from recordings, as in `hop identify`; empty where the
+            robot is not the identified twin.
         belt: Whether the fit and training know a belt, with assumed backlash and jitter.
         robot: Robot that is trained on without a fit; None takes the one that the twin extends.
         ranges: What every leg in training draws for itself, around the robot.
@@ -28,7 +29,7 @@ class Method:
 
     name: str
     meaning: str
-    fitted: bool = False
+    fit: str = ""
     belt: bool = False
     robot: str | None = None
     ranges: Randomise = "none"
@@ -40,8 +41,9 @@ class Method:
 METHODS = {
     method.name: method
     for method in (
-        Method("identified", "identified from both recordings", fitted=True),
-        Method("identified-belt", "identified, with the knee's belt", fitted=True, belt=True),
+        Method("identified", "identified from both recordings", fit="least-squares"),
+        Method("identified-belt", "identified, with the knee's belt", "least-squares", belt=True),
+        Method("two-pass", "the paper's two passes of CMA-ES", fit="two-pass"),
         Method("cad", "CAD defaults"),
         Method("table-1", "the paper's Table I", robot="legv2-paper"),
         Method("randomised", "domain randomisation over the twins' ranges", ranges="twins"),
@@ -54,8 +56,9 @@ METHODS = {
         ),
         Method(
             "energy-shaping-identified",
-            "energy shaping, tuned on what both recordings identify",
-            fitted=True,
+            "energy shaping, tuned on what is identified with the belt",
+            fit="least-squares",
+            belt=True,
             untrained=ENERGY_SHAPING,
             tuned=True,
         ),
@@ -63,7 +66,7 @@ METHODS = {
         Method(
             "universal-identified",
             "`universal`, told what both recordings identify",
-            fitted=True,
+            fit="least-squares",
             untrained="universal",
         ),
     )

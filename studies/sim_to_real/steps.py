@@ -7,7 +7,7 @@ from pathlib import Path
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig
 from hopping_leg.controllers.command_schedule import command_range
-from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller
+from hopping_leg.controllers.registry import ENERGY_SHAPING_TUNED, load_controller
 from hopping_leg.evaluate import Entry, runner
 from hopping_leg.identify import excitation, play_excitation
 from hopping_leg.identify.optimizers import SearchOptions
@@ -17,6 +17,7 @@ from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.result import as_json, save_robot
+from hopping_leg.io import write_atomically
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.run_folder import read_result
 from hopping_leg.rl.train import train
@@ -24,7 +25,7 @@ from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim import Measurement
 from studies.energy_shaping.tune import Tune
 from studies.shared import Row
-from studies.sim_to_real.twins import Noise, Twin, disturbance_of, with_play
+from studies.sim_to_real.twins import BELT, Noise, Twin, disturbance_of, with_play
 
 RIGS: tuple[Rig, ...] = ("fixed-base", "rail")
 
@@ -61,8 +62,8 @@ def _strokes(rig: Rig, seconds: float) -> Strokes:
     return fixed_base(swings=swings, duration=seconds)
 
 
-def fit(twin: Twin, recordings: Sequence[Path], file: Path, belt: bool) -> Row:
-    """Identify a twin, with the knee's belt if asked, and write the robot file.
+def fit(twin: Twin, recordings: Sequence[Path], file: Path, search: str, belt: bool) -> Row:
+    """Identify a twin by a search, with the knee's belt if asked, and write the robot file.
 
     What is returned are errors on data that the fit has not seen, and the parameters.
     """
@@ -71,6 +72,7 @@ def fit(twin: Twin, recordings: Sequence[Path], file: Path, belt: bool) -> Row:
     options = IdentifyOptions(
         parameters=("+reality.knee.stiffness",) if belt else None,
         bounds={k: (v / _INERTIA_FACTOR, v * _INERTIA_FACTOR) for k, v in links.items()},
+        search=search,
         effort=SearchOptions(tolerance=_USUAL_TOLERANCE),
     )
     identified = identify([load_recording(path) for path in recordings], believed, options=options)
@@ -80,7 +82,7 @@ def fit(twin: Twin, recordings: Sequence[Path], file: Path, belt: bool) -> Row:
     errors = ("closed_loop_position_rms_rad", "closed_loop_torque_rms_nm")
     kept = ("name", "unit", "start", "value", "interval_low", "interval_high", "at_bound")
     return {
-        "method": "identified-belt" if belt else "identified",
+        "method": file.stem.removeprefix(f"{twin.name}-"),
         "twin": twin.name,
         **{f"{name}_before": before[name] for name in errors},
         **{name: after[name] for name in errors},
@@ -115,12 +117,14 @@ def learn(recipe: Recipe, robot: Robot, seed: int, folder: Path) -> Row:
     }
 
 
-TUNE = Tune(start=ENERGY_SHAPING, threads=1)
+TUNE = Tune(start=ENERGY_SHAPING_TUNED, threads=1)
 
 
 def tune(source: str, folder: Path) -> Row:
-    """Search gains of energy shaping in the simulation of a robot."""
-    return replace(TUNE, robot=source, out=folder).find()
+    """Search gains of energy shaping in the simulation of a robot with an assumed belt."""
+    told = folder / "told.toml"
+    write_atomically(told, BELT.format(Path(source).resolve()).encode())
+    return replace(TUNE, robot=str(told), out=folder).find()
 
 
 class WithinRange:

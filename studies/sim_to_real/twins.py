@@ -4,8 +4,10 @@ A twin brings latency, noise and losses of its own; the paper's disturbance come
 off: with ``own`` it meets only legs without [reality].
 """
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
@@ -79,8 +81,12 @@ def find_twins(words: Sequence[str], folder: Path) -> tuple[Twin, ...]:
     return found
 
 
-PLAY: dict[str, Any] = {"backlash": 1.75e-3, "stiffness_damping": 0.03}
-"""Assumed of the knee's belt: qdd100 +-0.1 deg at its output, behind the belt; rubber. SI."""
+BELT = (resources.files("hopping_leg.cli") / "with_belt.toml").read_text(encoding="utf-8")
+"""A robot file that extends another one by what is assumed of its knee's belt."""
+
+_KNEE = tomllib.loads(BELT.format("legv2"))["reality"]["knee"]
+PLAY: dict[str, Any] = {name: number["value"] for name, number in _KNEE.items()}
+"""What is assumed of the belt, SI."""
 _JITTER = 5e-4  # of commands, s, assumed with it
 
 Noise = Literal["own", "on", "off"]
