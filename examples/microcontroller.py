@@ -1,0 +1,47 @@
+"""A policy as one C file without dependencies, compared with ONNX Runtime and timed.
+
+python examples/microcontroller.py [POLICY.onnx]; needs emx-onnx-cgen and a C compiler.
+"""
+
+import ctypes
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+
+import hopping_leg
+
+policies = Path(hopping_leg.__file__).parent / "policies"
+policy = Path(sys.argv[1]) if len(sys.argv) > 1 else policies / "rl.onnx"
+compiler = [sys.executable, "-m", "emx_onnx_cgen", "compile", "--input-dim", "n=1"]
+inside = ["--large-weight-threshold", "0", "--large-temp-threshold", "0"]  # no file, no malloc
+options = [*compiler, *inside, "--model-name", "policy"]
+subprocess.run([*options, policy, "policy.c"], check=True, stdout=subprocess.DEVNULL)
+subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", "policy.so", "policy.c", "-lm"], check=True)
+act = ctypes.CDLL(Path("policy.so").resolve()).policy
+
+session = onnxruntime.InferenceSession(policy)
+shapes = {i.name: (1, *i.shape[1:]) for i in session.get_inputs()}
+outputs = [np.zeros((1, *o.shape[1:]), np.float32) for o in session.get_outputs()]
+rng, seconds, pairs = np.random.default_rng(0), 0.0, []
+inputs = {name: np.zeros(shape, np.float32) for name, shape in shapes.items()}
+for _ in range(1000):
+    inputs |= {
+        name: rng.uniform(0, 0.5, shape).astype(np.float32)
+        for name, shape in shapes.items()
+        if name != "memory"
+    }
+    expected = session.run(None, inputs)
+    began = time.perf_counter()
+    act(*(a.ctypes.data_as(ctypes.c_void_p) for a in (*inputs.values(), *outputs)))
+    seconds += time.perf_counter() - began
+    pairs.append((outputs[0].copy(), expected[0]))
+    if len(outputs) > 1:
+        inputs["memory"] = outputs[1].copy()
+ours, theirs = np.array(pairs).swapaxes(0, 1)
+off = np.abs(ours - theirs).max() / np.abs(theirs).max()
+size = len(policy.read_bytes()) / 1e3
+print(f"{policy.name}: {size:.0f} kB, {seconds * 1e3:.0f} us a call, torques differ by {off:.1e}")
