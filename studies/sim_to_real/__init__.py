@@ -26,12 +26,9 @@ RESULTS = (
     "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping-tuned "
     "energy-shaping --folder runs/legs --jobs 2 --out runs/zero-shot-legs "
     "--json studies/sim_to_real/results/zero_shot_legs.json",
-    "python -m studies.sim_to_real transfer --methods universal-identified universal "
-    "energy-shaping-identified --jobs 2 "
-    "--folder runs/transfer-universal --json studies/sim_to_real/results/universal.json",
     *(
-        "python -m studies.sim_to_real transfer --methods identified-belt identified cad table-1 "
-        "randomised --seeds 0 1 2 "
+        "python -m studies.sim_to_real transfer --methods identified-belt identified two-pass cad "
+        "table-1 randomised energy-shaping-identified universal universal-identified --seeds 0 1 2 "
         f"--disturbance {noise} --jobs 2 --folder runs/transfer-fast "
         f"--json studies/sim_to_real/results/fast_noise_{noise}.json"
         for noise in ("on", "off")

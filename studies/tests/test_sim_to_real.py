@@ -10,6 +10,7 @@ import pytest
 from tests.controllers.test_rollout import Constant
 
 from hopping_leg.controllers import RolloutConfig
+from hopping_leg.controllers.energy_shaping.gains import load_gains
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.identify.recording import load_recording
@@ -100,10 +101,10 @@ def test_no_method_but_the_truth_trains_on_what_the_twin_alone_knows(tmp_path):
 
 
 def test_a_belt_is_trained_on_as_fitted_and_noise_comes_when_asked(tmp_path):
-    one = chain(tmp_path, ("identified", "identified-belt"), disturbance="on")
+    one = chain(tmp_path, ("identified", "identified-belt", "two-pass"), disturbance="on")
     assert disturbance_of(load_robot("legv2"), "off") == NO_NOISE
     assert one.about()["twins"][0]["paper_disturbance"]
-    assert len({one.source(one.twins[0], method) for method in one.methods[:2]}) == 2
+    assert len({one.source(one.twins[0], method) for method in one.methods[:3]}) == 3
     knee = simulated(one.twins[0].source, belt=True).reality.knee
     assert knee.stiffness == one.twins[0].robot.reality.knee.stiffness
     assert knee.backlash == PLAY["backlash"]
@@ -148,6 +149,7 @@ def test_gains_are_tuned_on_what_was_identified_and_hop_on_the_twin(tmp_path, mo
     file = one._tuning(twin, method)[-1] / "gains.toml"
     tuned = steps.load(file, one.source(twin, method))
     shipped = steps.load("energy-shaping", "legv2")
+    assert load_robot(load_gains(str(file)).robot).reality.knee.backlash == PLAY["backlash"]
     assert tuned.gains != shipped.gains
     assert (tuned.robot.name, shipped.robot.name) == ("found", "legv2")
 
