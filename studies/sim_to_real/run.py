@@ -23,13 +23,7 @@ class Transfer(Experiment):
             "recipe": self.recipe,
             "training_steps": self.steps,
             **tabulate({method.name: method.meaning for method in chain.methods}, trials),
-            "identification": [
-                {
-                    **fit,
-                    "parameters": {p["name"]: (p["value"], p["truth"]) for p in fit["parameters"]},
-                }
-                for fit in identification
-            ],
+            "identification": identification,
             "trainings": trainings,
         }
         errors = ("median_abs_error_m", "median_abs_error_low_m", "median_abs_error_high_m")

@@ -65,7 +65,8 @@ def _strokes(rig: Rig, seconds: float) -> Strokes:
 def fit(twin: Twin, recordings: Sequence[Path], file: Path, search: str, belt: bool) -> Row:
     """Identify a twin by a search, with the knee's belt if asked, and write the robot file.
 
-    What is returned are errors on data that the fit has not seen, and the parameters.
+    What is returned are errors on data that the fit has not seen, and each parameter's value and
+    that of the twin itself.
     """
     believed = with_play(load_robot(twin.believed)) if belt else load_robot(twin.believed)
     links = {"thigh.inertia": believed.thigh.inertia, "shank.inertia": believed.shank.inertia}
@@ -80,16 +81,14 @@ def fit(twin: Twin, recordings: Sequence[Path], file: Path, search: str, belt: b
     found = as_json(identified)
     before, after, truth = found["start_validation"], found["validation"], load_robot(twin.source)
     errors = ("closed_loop_position_rms_rad", "closed_loop_torque_rms_nm")
-    kept = ("name", "unit", "start", "value", "interval_low", "interval_high", "at_bound")
     return {
         "method": file.stem.removeprefix(f"{twin.name}-"),
         "twin": twin.name,
         **{f"{name}_before": before[name] for name in errors},
         **{name: after[name] for name in errors},
-        "parameters": [
-            {**{key: row[key] for key in kept}, "truth": _truth(truth, row["name"])}
-            for row in found["parameters"]
-        ],
+        "parameters": {
+            row["name"]: (row["value"], _truth(truth, row["name"])) for row in found["parameters"]
+        },
     }
 
 

@@ -128,7 +128,7 @@ def test_a_twin_is_recorded_to_its_stops_and_identified_from_that_alone(tmp_path
     assert (fit["method"], fit["twin"]) == ("identified", "twin-0")
     recording = load_recording(tmp_path / "recordings" / "twin-0-rail.parquet")
     assert recording.array("position").min() < one.twins[0].robot.knee.stop_lower
-    truth = {row["name"]: row["truth"] for row in fit["parameters"]}
+    truth = {name: true for name, (_, true) in fit["parameters"].items()}
     assert truth["hip.friction"] == one.twins[0].robot.hip.friction
     assert truth["drive.delay"] == one.twins[0].robot.reality.latency.command
     found = load_robot(one.source(one.twins[0], one.methods[0]))
