@@ -39,6 +39,7 @@ REFUSED = [
     ("deploy energy-shaping", "add --yes"),
     ("doctor --write", "name their --transport"),
     ("doctor --transport /none/port", "There is no serial port /none/port"),
+    ("doctor --transport pi3hat", "pip install 'hopping-leg[pi3hat]'"),
     ("doctor --transport socketcn:can0", "python-can has no interface 'socketcn'"),
     ("emulate --seconds 0 --start-pose x", "There is no pose 'x'"),
     ("emulate --seconds 0 --faults none.toml", "Could not use none.toml"),

@@ -1,17 +1,28 @@
-"""Adapters alone: what the port does not take, what asks for checksums."""
+"""Adapters alone: what the port does not take, what asks for checksums, a pi3hat's buses."""
 
+import asyncio
 import os
 import time
 import tty
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg.deploy.fdcanusb import Fdcanusb
-from hopping_leg.deploy.frames import Frame, LineBuffer, split_checksum, with_checksum
+from hopping_leg.deploy.frames import (
+    REPLY_WANTED,
+    Frame,
+    LineBuffer,
+    split_checksum,
+    with_checksum,
+)
+from hopping_leg.deploy.transport import Pi3Hat
+from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.ports import LineProtocol
 from hopping_leg.errors import HardwareError
+from tests.emulator.bench import Bench
 
 WAIT = 2.0
 """Longest wait for replies, s: generous, as machines that run tests are slow."""
@@ -83,4 +94,61 @@ def test_an_adapter_that_asks_for_checksums_gets_them(terminal):
     assert port.trouble == "ERR checksum missing"
     with pytest.raises(HardwareError, match="in use by another process, or this one"):
         Fdcanusb(os.ttyname(slave))
+    port.close()
+
+
+class Hat:
+    """A pi3hat as its library shows it, with a bench's drives, one by default on each bus."""
+
+    def __init__(self, robot, *ids):
+        self.robot, self.sent, self.close = robot, [], lambda: None
+        said = {"parent": lambda: self, "empty_bus_tx_safe": lambda: True}
+        self.buses = [SimpleNamespace(ids=n, **said) for n in ids or ((), (1,), (2,))]
+
+    async def transaction(self, requests):
+        for bus, frame in ((r.child_device, r.frame) for r in requests):
+            self.sent.append(bus)
+            frame = Frame(frame.arbitration_id, frame.data)
+            if frame.destination in bus.ids:
+                self.robot.receive(frame)
+        while not all(r.responses for r in requests if r.frame_filter):
+            for item in self.robot.reply_queue.take(self.robot.time):
+                for r in (r for r in requests if r.frame_filter and r.frame_filter(item.frame)):
+                    r.responses += [item.frame] * (item.frame.source in r.child_device.ids)
+            await asyncio.sleep(1e-3)
+
+    async def receive_frame(self):
+        await asyncio.sleep(WAIT)
+
+
+def answering(port, *drives, seconds=WAIT):
+    """Ask drives for their modes at once; return which answer."""
+    port.send([Frame(REPLY_WANTED | drive, b"\x11\x00") for drive in drives])
+    return [frame.source for frame in port.receive(time.monotonic() + seconds) or ()]
+
+
+def test_a_pi3hat_finds_each_drives_bus_and_waits_no_longer_than_it_may():
+    bench = Bench(faults=[Fault("drop_reply", drive="knee", since="start", at=0.1)])
+    hat = Hat(bench.robot)
+    port = Pi3Hat(lambda: hat.buses)
+    assert answering(port, 1) + answering(port, 2) == [1, 2]
+    assert hat.sent == [*hat.buses, *hat.buses]
+    assert answering(port, 1, 2) == [1, 2]
+    port.send([Frame(2, b"\x01\x00\x00")])
+    assert hat.sent[6:] == [*hat.buses[1:], hat.buses[2]]
+    bench.wait(0.101)
+    began = time.monotonic()
+    assert answering(port, 1, 2, seconds=0.2) == [1]
+    assert port.receive(0.0) is None
+    assert 0.2 <= time.monotonic() - began < WAIT
+    with pytest.raises(HardwareError, match="pi3hat is in use"):
+        Pi3Hat(lambda: hat.buses)
+    assert not port.trouble
+    port.close()
+
+
+def test_a_pi3hat_with_two_drives_of_one_id_is_refused():
+    port = Pi3Hat(lambda: Hat(Bench().robot, (1,), (1, 2)).buses)
+    with pytest.raises(HardwareError, match="drives of id 1"):
+        answering(port, 1)
     port.close()

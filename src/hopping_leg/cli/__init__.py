@@ -97,7 +97,7 @@ _EXTRAS = {
     **dict.fromkeys(("torch", "stable_baselines3", "onnx", "tensorboard"), "train"),
     **dict.fromkeys(("moteus", "can", "serial"), "hardware"),
     **dict.fromkeys(("mcap", "mcap_ros2", "rosbags"), "ros"),
-    "viser": "view",
+    **{"viser": "view", "moteus_pi3hat": "pi3hat"},
 }
 
 

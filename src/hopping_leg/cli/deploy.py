@@ -40,7 +40,7 @@ class Deploy:
     controller: tyro.conf.Positional[str]
     """A name, a file (.onnx, .toml), or a Python class as FILE.py:CLASS."""
     transport: str
-    """Path of an fdcanusb, or interface:channel of python-can."""
+    """Path of an fdcanusb, interface:channel of python-can, or pi3hat."""
     robot: options.OwnRobot = None
     command: float | None = None
     """Height to hop to, m; default: the middle of the policy's training, 0.30 for others."""

@@ -27,7 +27,7 @@ class Doctor:
     """Which drives, and what may be changed."""
 
     transport: str | None = None
-    """Path of an fdcanusb, or interface:channel of python-can; without one code is
+    """Path of an fdcanusb, interface:channel of python-can, or pi3hat; without one code is
     compiled."""
     robot: str = DEFAULT_ROBOT
     """A shipped robot or a .toml file; its table [hardware] says how the drives are wired."""

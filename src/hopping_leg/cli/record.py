@@ -103,7 +103,7 @@ class Play:
     robot: str | None = None
     """A shipped robot or a .toml file; default twin, with --transport legv2."""
     transport: str | None = None
-    """Record from motors: path of an fdcanusb, or interface:channel of python-can."""
+    """Record from motors: path of an fdcanusb, interface:channel of python-can, or pi3hat."""
     yes: bool = False
     """Arm motors without asking."""
     out: Path = Path("recordings")

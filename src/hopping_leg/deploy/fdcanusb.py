@@ -142,7 +142,7 @@ def opened(give_back: Callable[[], None], make: Callable[[], Any]) -> Any:  # no
     """Return what is made; where that fails, give the lock back, raise ``HardwareError``."""
     try:
         return make()
-    except Exception as error:  # serial ports and python-can raise many types
+    except Exception as error:  # serial ports, python-can and the pi3hat raise many
         give_back()
         if isinstance(error, HardwareError):
             raise

@@ -1,15 +1,20 @@
-"""The adapters, for one host at a time: an fdcanusb, or a bus of python-can.
+"""The adapters, for one host at a time: an fdcanusb, a bus of python-can, or a pi3hat.
 
 None of them ever waits beyond the time that it is given, whatever the adapter does. The client
 library's own wait for a lost reply without bound, lose the healthy drive's reply when they are
 cancelled, and are silenced by a line of noise.
 """
 
+import asyncio
+import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Coroutine, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import can
+import moteus
 
 from hopping_leg import locks
 from hopping_leg.deploy.fdcanusb import Fdcanusb, LineTransport, opened
@@ -17,13 +22,17 @@ from hopping_leg.deploy.frames import Frame, padded
 from hopping_leg.errors import HardwareError, UsageError
 
 _FORMS = (
-    "the path of an fdcanusb (e.g. /dev/serial/by-id/...), or interface:channel of python-can"
-    " (e.g. socketcan:can0)"
+    "the path of an fdcanusb (e.g. /dev/serial/by-id/...), interface:channel of python-can"
+    " (e.g. socketcan:can0), or pi3hat"
 )
 
 
 def open_transport(name: str) -> "Transport":
     """Open what a name means, or raise UsageError; HardwareError where it cannot be opened."""
+    if name == "pi3hat":
+        from moteus_pi3hat import Pi3HatFactory
+
+        return Pi3Hat(partial(Pi3HatFactory(), None))
     if "/" in name:
         if not Path(name).exists():
             raise UsageError(f"There is no serial port {name}; give {_FORMS}.")
@@ -80,7 +89,83 @@ class PythonCan:
         self._lock.release()
 
 
-Transport = LineTransport | PythonCan
+_SEND_SECONDS = 0.004  # A command that could not leave within this time is outdated
+_LEAST_SECONDS = 0.001  # In which what is asked leaves, also in a tick that began late
+_LONGEST_REPLY = 64  # bytes
+
+
+class Pi3Hat:
+    """A pi3hat's buses; a drive is asked on all of them until an answer tells where it is.
+
+    ``make`` returns the client library's devices, one a bus, whose event loop runs only while
+    something is asked of them. HardwareError says that the hat is in use or cannot be opened.
+    """
+
+    def __init__(self, make: Callable[[], list[Any]]) -> None:
+        self.trouble = ""
+        self._lock = locks.named_lock("host-pi3hat", "pi3hat", HardwareError)
+        buses = opened(self._lock.release, make)
+        self._hat, self._safe = buses[0].parent(), [b for b in buses if b.empty_bus_tx_safe()]
+        self._found, self._asked = dict[int, list[Any]](), list[Frame]()
+        self._loop, self._turn = asyncio.new_event_loop(), threading.Lock()
+
+    def send(self, frames: Sequence[Frame]) -> None:
+        """Send frames; those that want a reply leave when it is received, as the hat needs it."""
+        self._asked = [frame for frame in frames if frame.wants_reply]
+        if requests := self._requests([frame for frame in frames if not frame.wants_reply]):
+            self._run(self._hat.transaction(requests), _SEND_SECONDS)
+
+    def receive(self, until: float) -> list[Frame] | None:
+        """Return what arrives next; HardwareError says that two drives have one id."""
+        asked, self._asked = self._asked, []
+        seconds = max(until - time.monotonic(), _LEAST_SECONDS)
+        if not asked:
+            heard = self._run(self._hat.receive_frame(), seconds)
+            return [Frame(heard.arbitration_id, bytes(heard.data))] if heard else None
+        requests, replies = self._requests(asked), list[Frame]()
+        self._run(self._hat.transaction(requests), seconds)
+        for bus, reply in ((r.child_device, reply) for r in requests for reply in r.responses):
+            replies.append(frame := Frame(reply.arbitration_id, bytes(reply.data)))
+            if (known := self._found.setdefault(frame.source, [bus])) != [bus]:
+                raise HardwareError(f"At {known[0]} and {bus} are drives of id {frame.source}.")
+        return replies or None
+
+    def close(self) -> None:
+        """Close the hat."""
+        self._hat.close()
+        self._loop.close()
+        self._lock.release()
+
+    def _requests(self, frames: Sequence[Frame]) -> list[Any]:
+        """Return what the library calls requests; it waits for what passes their filter."""
+        return [
+            moteus.TransportDevice.Request(
+                moteus.Frame(f.arbitration_id, padded(f.data)),
+                bus,
+                partial(_answers, f) if f.wants_reply else None,
+                _LONGEST_REPLY * f.wants_reply,
+            )
+            for f in frames
+            for bus in self._found.get(f.destination, self._safe)
+        ]
+
+    def _run(self, work: Coroutine[Any, Any, Any], seconds: float) -> Any:  # noqa: ANN401
+        """Return the result of work, None if it took too long or failed."""
+        with self._turn:  # a loop that hangs is braked from another thread
+            try:
+                return self._loop.run_until_complete(asyncio.wait_for(work, seconds))
+            except TimeoutError:
+                return None
+            except Exception as error:  # the library raises many types
+                self.trouble = str(error)
+                return None
+
+
+def _answers(asked: Frame, reply: Any) -> bool:  # noqa: ANN401
+    return Frame(reply.arbitration_id, b"").answers(asked)
+
+
+Transport = LineTransport | PythonCan | Pi3Hat
 """Carries frames; what it cannot carry is lost, and ``trouble`` says why."""
 
 
