@@ -4,8 +4,6 @@ A file of frames, each ``kind, length, content, CRC-32``: one header (JSON), row
 (JSON). A frame that was cut off, as the process was killed, is left out.
 """
 
-import contextlib
-import os
 import struct
 import zlib
 from collections.abc import Iterator
@@ -16,7 +14,6 @@ import numpy as np
 import polars as pl
 
 from hopping_leg import errors, trace
-from hopping_leg.arrays import Array
 from hopping_leg.io import parse_json
 
 HEADER, ROW, EVENT = range(3)  # Kinds of frames
@@ -35,8 +32,9 @@ def frame(kind: int, content: bytes) -> bytes:
     return head + content + _CRC.pack(zlib.crc32(content, zlib.crc32(head)))
 
 
-def _frames(content: bytes, at: int) -> Iterator[tuple[int, bytes, int]]:
-    """Yield kind, content and end of every whole frame from ``at`` to the first that is not."""
+def _frames(content: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield kind and content of every whole frame behind the magic to the first that is not."""
+    at = len(MAGIC)
     while at + _FRAME.size <= len(content):
         kind, length = _FRAME.unpack_from(content, at)
         end = at + _FRAME.size + length + _CRC.size
@@ -45,88 +43,46 @@ def _frames(content: bytes, at: int) -> Iterator[tuple[int, bytes, int]]:
         (crc,) = _CRC.unpack_from(content, end - _CRC.size)
         if crc != zlib.crc32(content[at : end - _CRC.size]):
             return
-        yield kind, content[at + _FRAME.size : end - _CRC.size], end
+        yield kind, content[at + _FRAME.size : end - _CRC.size]
         at = end
-
-
-class FlightRecorderTail:
-    """Reads what is new in a flight recording; TraceError says that it cannot be read.
-
-    Attributes:
-        columns: Names of the rows' values; empty until the header is there.
-        header: Facts about the run; empty until the header is there.
-        events: So far, in order.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.columns: tuple[str, ...] = ()
-        self.header: dict[str, Any] = {}
-        self.events: list[dict[str, Any]] = []
-        self._rest, self._begun = b"", False
-        try:
-            self._file = path.open("rb", buffering=0)
-        except OSError as error:
-            raise errors.TraceError(f"Cannot read {path}: {error.strerror}.") from error
-
-    @property
-    def over(self) -> bool:
-        """Whether the file is gone: the run has ended and left its trace."""
-        return os.fstat(self._file.fileno()).st_nlink == 0
-
-    def rows(self) -> Array:
-        """Return the rows since the last call, (ticks, columns); TraceError for any other file."""
-        content = self._rest + self._file.read()
-        at = 0
-        if not self._begun:
-            if not content.startswith(MAGIC[: len(content)]):
-                raise errors.TraceError(f"{self.path} is no flight recording of `hop deploy`.")
-            if len(content) < len(MAGIC):
-                self._rest = content
-                return np.empty((0, 0))
-            at, self._begun = len(MAGIC), True
-        found = []
-        for kind, data, end in _frames(content, at):
-            at = end
-            if kind == HEADER and not self.columns:
-                first = parse_json(data, f"{self.path}: the header", errors.TraceError)
-                names: Any = first.get("columns")
-                header: Any = first.get("header")
-                named = isinstance(names, list) and names and all(isinstance(n, str) for n in names)
-                if not (named and len({*names}) == len(names) and isinstance(header, dict)):
-                    raise errors.TraceError(f"{self.path} is damaged: its header names no columns.")
-                self.columns, self.header = tuple(names), header
-            elif kind == ROW and len(data) == 8 * len(self.columns) > 0:
-                found.append(data)
-            elif kind == EVENT and self.columns:
-                self.events.append(parse_json(data, f"{self.path}: an event", errors.TraceError))
-            else:
-                raise errors.TraceError(
-                    f"{self.path} is damaged: it holds a frame of no known kind."
-                )
-        self._rest = content[at:]
-        return np.frombuffer(b"".join(found), "<f8").reshape(len(found), len(self.columns))
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
 
 
 def recover(path: Path) -> trace.Trace:
     """Return the common trace of a run from its flight recording, also if it was killed.
 
     Columns that a trace may rely on and the recording lacks hold NaN. TraceError says that the
-    file is missing, no flight recording, or holds no tick.
+    file is missing, no flight recording, damaged, or holds no tick.
     """
-    with contextlib.closing(FlightRecorderTail(path)) as box:
-        rows = box.rows()
-    if not len(rows):
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise errors.TraceError(f"Cannot read {path}: {error.strerror}.") from error
+    if not content.startswith(MAGIC):
+        raise errors.TraceError(f"{path} is no flight recording of `hop deploy`.")
+    names: Any = ()
+    header: Any = {}
+    found, events = list[bytes](), list[dict[str, Any]]()
+    for kind, data in _frames(content):
+        if kind == HEADER and not names:
+            first = parse_json(data, f"{path}: the header", errors.TraceError)
+            names, header = first.get("columns"), first.get("header")
+            named = isinstance(names, list) and names and all(isinstance(n, str) for n in names)
+            if not (named and len({*names}) == len(names) and isinstance(header, dict)):
+                raise errors.TraceError(f"{path} is damaged: its header names no columns.")
+        elif kind == ROW and len(data) == 8 * len(names) > 0:
+            found.append(data)
+        elif kind == EVENT and names:
+            events.append(parse_json(data, f"{path}: an event", errors.TraceError))
+        else:
+            raise errors.TraceError(f"{path} is damaged: it holds a frame of no known kind.")
+    if not found:
         raise errors.TraceError(f"{path} holds no tick of a run.")
-    missing = [name for name in trace.COLUMNS if name not in box.columns]
-    table = pl.DataFrame(dict(zip(box.columns, rows.T, strict=True))).with_columns(
+    rows = np.frombuffer(b"".join(found), "<f8").reshape(len(found), len(names))
+    missing = [name for name in trace.COLUMNS if name not in names]
+    table = pl.DataFrame(dict(zip(names, rows.T, strict=True))).with_columns(
         pl.lit(float("nan")).alias(name) for name in missing
     )
-    return trace.Trace(table, {**box.header, "events": box.events})
+    return trace.Trace(table, {**header, "events": events})
 
 
 def load_trace(path: Path) -> trace.Trace:

@@ -75,8 +75,7 @@ REFUSED = [
     ("train --out .", "holds no run"),
     ("view nobody", "There is no controller 'nobody'"),
     ("view fast paper fast", "give one, or two side by side"),
-    ("view --box none", "There is no none"),
-    ("view --trace a.parquet --box runs", "exclude each other"),
+    ("view --trace none.blackbox", "Cannot read none.blackbox"),
     ("view --port 70000", "between 0 and 65535"),
     ('view "my leg\'s.toml"', "is a robot file, no controller; give it with --robot"),
 ]

@@ -10,13 +10,12 @@ pytest.importorskip("viser", reason="the extra 'view' is not installed")
 
 from PIL import Image
 
-from hopping_leg.flight_recording import SUFFIX
 from hopping_leg.viewer.live_leg import LiveSimulation
 from hopping_leg.viewer.panels import HEIGHT_STEP, KEY_STEP
-from hopping_leg.viewer.tracks import RecorderSource, ReplaySource
+from hopping_leg.viewer.tracks import ReplaySource
 from hopping_leg.viewer.viewer import Viewer
 from tests.browser import PATIENCE, running, wait_for_leg
-from tests.viewer.test_tracks import finished, stored
+from tests.viewer.test_tracks import stored
 
 pytestmark = pytest.mark.slow
 ROBOT = "legv2-paper"
@@ -132,13 +131,3 @@ def test_a_trace_is_replayed(page, tmp_path):
         until(lambda: replay.now == 0.0)
         page.keyboard.press("End")
         until(lambda: replay.now == pytest.approx(replay.length))
-
-
-def test_a_run_on_the_leg_is_followed(page, tmp_path):
-    follow = RecorderSource(tmp_path)
-    viewer = Viewer(follow, port=0)
-    with running(viewer):
-        page.goto(viewer.address)
-        finished(tmp_path / f"fast-1{SUFFIX}", 200, robot=ROBOT)
-        page.get_by_text("the leg is shown standing").wait_for()
-        assert follow.now == pytest.approx(199 / 200)

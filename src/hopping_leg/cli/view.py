@@ -2,16 +2,15 @@
 
 Without further words a live simulation: change height, controller, robot, payload, ground and
 delay while it hops, push it, pause, step, go slow; a second controller hops beside the first. With
---trace it replays traces, simulated or from hardware; with --box it shows the real leg while
-`hop deploy` runs. It needs no screen on this computer: on another one, open the printed address
-through `ssh -L 8080:localhost:8080`. `hop demo` is the same verb.
+--trace it replays traces, simulated or from hardware. It needs no screen on this computer: on
+another one, open the printed address through `ssh -L 8080:localhost:8080`. `hop demo` is the same
+verb.
 
 Examples:
   hop view
   hop view fast energy-shaping --height 0.32
   hop view runs/mine/policy.onnx --robot examples/my_leg.toml
   hop view --trace runs/deploy/fast-20260101-120000.parquet
-  hop view --box runs/deploy
 """
 
 import os
@@ -25,7 +24,6 @@ import tyro
 
 from hopping_leg.cli import DEMO
 from hopping_leg.cli.options import say
-from hopping_leg.errors import UsageError
 
 if TYPE_CHECKING:
     from hopping_leg.viewer.viewer import Source
@@ -45,9 +43,7 @@ class View:
     seed: int = 0
     """Seed of noise and random delay."""
     trace: tuple[Path, ...] = ()
-    """Traces to replay, one or two side by side."""
-    box: Path | None = None
-    """A flight recording to follow instead, or a folder whose newest one is followed."""
+    """Traces to replay, one or two side by side; also the .blackbox that a killed run left."""
     port: int = 8080
     """Port of this computer alone; if it is in use, the next free one."""
     browser: bool = True
@@ -78,13 +74,9 @@ def _source(args: View) -> "Source":
     """Return what is to be shown; whatever can be wrong with it is found here."""
     from hopping_leg.controllers.registry import robot_of
     from hopping_leg.viewer.live_leg import LiveSimulation
-    from hopping_leg.viewer.tracks import RecorderSource, ReplaySource
+    from hopping_leg.viewer.tracks import ReplaySource
 
-    if args.trace and args.box is not None:
-        raise UsageError("--trace and --box exclude each other; give one of them.")
     if args.trace:
         return ReplaySource(args.trace, args.robot)
-    if args.box is not None:
-        return RecorderSource(args.box, args.robot)
     robot = args.robot or robot_of(args.controllers)
     return LiveSimulation(args.controllers, robot, args.height, args.seed)

@@ -182,8 +182,6 @@ class Scene:
 
 def _plots(tracks: list[Track], time: Array) -> list[dict[str, Any]]:
     """Return all that each plot of some legs over the time, s, consists of."""
-    if not tracks:
-        return []
     robot, samples = tracks[0].robot, [track.sample(time) for track in tracks]
     tall, command = 1.5 * robot.straight_height, (COMMAND, 2.0, samples[0]["command_m"])
     shown = [("Height / m over time / s", "height_m", (0.0, tall), [command])]

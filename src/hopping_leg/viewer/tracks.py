@@ -1,7 +1,7 @@
-"""What is shown: one leg's rows over time, from a live simulation, stored traces or `hop deploy`.
+"""What is shown: one leg's rows over time, from a live simulation or stored traces.
 
-A live simulation appends rows as it goes, a replay has them all, a run on the real leg grows from
-outside; scene and curves know nothing but tracks.
+A live simulation appends rows as it goes, a replay has them all; scene and curves know nothing but
+tracks.
 """
 
 from pathlib import Path
@@ -12,7 +12,7 @@ import polars as pl
 
 from hopping_leg import errors, hop_detection
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.flight_recording import SUFFIX, FlightRecorderTail
+from hopping_leg.flight_recording import load_trace
 from hopping_leg.robot import Robot, kinematics, load_robot
 from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.trace import Trace
@@ -80,10 +80,8 @@ class Track:
         columns = {name: trace.column(name) if name in known else unknown for name in FIELDS}
         measured = np.isfinite(columns["height_m"]).any()
         for name in (*_ANGLES, "height_m") if measured else _ANGLES:
-            before = self.field(name)[-1:] if len(self) else [np.nan]
-            angle = pl.Series(np.append(before, columns[name])).fill_nan(None)
-            angle = angle.fill_null(strategy="forward").fill_null(strategy="backward").fill_null(0)
-            columns[name] = angle.to_numpy()[1:]
+            angle = pl.Series(columns[name]).fill_nan(None).fill_null(strategy="forward")
+            columns[name] = angle.fill_null(strategy="backward").fill_null(0).to_numpy()
         if not measured:
             q = np.stack([columns[name] for name in _ANGLES], axis=-1)
             columns["height_m"] = kinematics.stance_height(self.robot, q)
@@ -126,7 +124,7 @@ class Track:
 
 
 class ReplaySource:
-    """One or two traces side by side; both begin at zero.
+    """One or two traces, or flight recordings, side by side; both begin at zero.
 
     The robot, a name or file, is the one that each trace names unless it is given. UsageError says
     that there are too many traces, TraceError that one cannot be read or holds no tick, RobotError
@@ -154,7 +152,7 @@ class ReplaySource:
         self.now = min(max(time, 0.0), self.length)
 
     def _load(self, path: Path, robot: str | None) -> Track:
-        stored = Trace.load(path)
+        stored = load_trace(path)
         stored.require_ticks(path)
         leg = _load_leg(robot, stored.header, path)
         if not leg.has_digest(stored.header.get("robot_digest", leg.digest)):
@@ -179,61 +177,3 @@ def _load_leg(robot: str | None, header: dict[str, Any], path: Path) -> Robot:
         ) from error
     leg.require_leg()
     return leg
-
-
-_LOOK = 0.5  # Seconds between looks for a newer run
-
-
-class RecorderSource:
-    """Shows the newest run; the robot that runs it learns nothing of it.
-
-    The path is of a black box, or of the folder in which `hop deploy` writes them, else UsageError;
-    the robot, a name or file, is the one that the run names unless it is given.
-    """
-
-    def __init__(self, path: Path, robot: str | None = None) -> None:
-        if not path.exists():
-            raise errors.UsageError(
-                f"There is no {path}; give a {SUFFIX} file or the folder of `hop deploy --out`."
-            )
-        self.tracks: list[Track] = []
-        self.notices: list[str] = []
-        self.now = 0.0
-        self._path, self._robot = path, robot
-        self._tail: FlightRecorderTail | None = None
-        self._over = False
-        self._wait = 0.0
-        if path.is_dir():
-            self.notices.append(f"Waiting for a run in {path}.")
-
-    def advance(self, seconds: float) -> None:
-        """Read what is new; RobotError for an unknown robot, TraceError for no flight recording."""
-        self._wait -= seconds
-        if self._wait <= 0:
-            self._wait = _LOOK
-            self._look()
-        rows = self._tail.rows() if self._tail else ()
-        if self._tail is None or not len(rows):
-            return
-        if not self.tracks:
-            header = self._tail.header
-            robot = _load_leg(self._robot, header, self._tail.path)
-            self.tracks = [Track(str(header.get("controller", "")), robot, depth=KEPT)]
-        table = pl.DataFrame(rows, schema=list(self._tail.columns), orient="row")
-        self.tracks[0].extend_by_trace(Trace(table))
-        self.now = float(self.tracks[0].time[-1])
-
-    def _look(self) -> None:
-        """Turn to a newer run, if there is one; say when this one is over."""
-        if self._tail is not None and self._tail.over and not self._over:
-            self._over = True
-            self.notices.append("The run is over; its trace is on disk.")
-        boxes = [self._path]
-        if self._path.is_dir():  # of those written in one tick of the file system, the last by name
-            boxes = sorted(self._path.glob(f"*{SUFFIX}"), key=lambda b: (b.stat().st_mtime_ns, b))
-        if not boxes or (self._tail is not None and boxes[-1] == self._tail.path):
-            return
-        if self._tail is not None:
-            self._tail.close()
-        self._tail, self._over, self.tracks, self.now = FlightRecorderTail(boxes[-1]), False, [], 0
-        self.notices.append(f"Following {boxes[-1].name}.")

@@ -34,7 +34,7 @@ _SLOW = 5  # Pictures per update of each plot and of the text; they take turns
 _NOTICE_SECONDS = 8.0
 
 
-Source = live_leg.LiveSimulation | tracks.ReplaySource | tracks.RecorderSource
+Source = live_leg.LiveSimulation | tracks.ReplaySource
 """Each has ``tracks``, the time ``now`` that is shown, s, and ``notices`` to be told."""
 
 
@@ -65,8 +65,7 @@ class Viewer:
             panels.LivePanel(self._inputs, source)
         if isinstance(source, tracks.ReplaySource):
             self._replay_panel = panels.ReplayPanel(self._inputs, source)
-        if not isinstance(source, tracks.RecorderSource):
-            panels.add_time_controls(self._inputs, self.clock)
+        panels.add_time_controls(self._inputs, self.clock)
         panel = gui.add_panel()
         self._scene = scene.Scene(self._server, panel.add_tab("Last seconds"))
         panel.dock_right()
