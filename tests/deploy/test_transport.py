@@ -4,20 +4,17 @@ import asyncio
 import os
 import time
 import tty
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 
+import moteus
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg.deploy.fdcanusb import Fdcanusb
-from hopping_leg.deploy.frames import (
-    REPLY_WANTED,
-    Frame,
-    LineBuffer,
-    split_checksum,
-    with_checksum,
-)
+from hopping_leg.deploy.frames import REPLY_WANTED as ASKED
+from hopping_leg.deploy.frames import Frame, LineBuffer, split_checksum, with_checksum
 from hopping_leg.deploy.transport import Pi3Hat
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.ports import LineProtocol
@@ -101,7 +98,7 @@ class Hat:
     """A pi3hat as its library shows it, with a bench's drives, one by default on each bus."""
 
     def __init__(self, robot, *ids):
-        self.robot, self.sent, self.close = robot, [], lambda: None
+        self.robot, self.sent, self.heard, self.close = robot, [], [], lambda: None
         said = {"parent": lambda: self, "empty_bus_tx_safe": lambda: True}
         self.buses = [SimpleNamespace(ids=n, **said) for n in ids or ((), (1,), (2,))]
 
@@ -111,20 +108,20 @@ class Hat:
             frame = Frame(frame.arbitration_id, frame.data)
             if frame.destination in bus.ids:
                 self.robot.receive(frame)
-        while not all(r.responses for r in requests if r.frame_filter):
-            for item in self.robot.reply_queue.take(self.robot.time):
-                for r in (r for r in requests if r.frame_filter and r.frame_filter(item.frame)):
-                    r.responses += [item.frame] * (item.frame.source in r.child_device.ids)
-            await asyncio.sleep(1e-3)
+                replies = [item.frame for item in self.robot.reply_queue.take(self.robot.time)]
+                self.heard += [moteus.Frame(r.arbitration_id, r.data, channel=bus) for r in replies]
 
     async def receive_frame(self):
-        await asyncio.sleep(WAIT)
+        while not self.heard:
+            await asyncio.sleep(1e-3)
+        return self.heard.pop(0)
 
 
 def answering(port, *drives, seconds=WAIT):
     """Ask drives for their modes at once; return which answer."""
-    port.send([Frame(REPLY_WANTED | drive, b"\x11\x00") for drive in drives])
-    return [frame.source for frame in port.receive(time.monotonic() + seconds) or ()]
+    port.send([Frame(ASKED | drive, b"\x11\x00") for drive in drives])
+    until = time.monotonic() + seconds
+    return [frame.source for _ in drives for frame in port.receive(until) or ()]
 
 
 def test_a_pi3hat_finds_each_drives_bus_and_waits_no_longer_than_it_may():
@@ -138,17 +135,38 @@ def test_a_pi3hat_finds_each_drives_bus_and_waits_no_longer_than_it_may():
     assert hat.sent[6:] == [*hat.buses[1:], hat.buses[2]]
     bench.wait(0.101)
     began = time.monotonic()
-    assert answering(port, 1, 2, seconds=0.2) == [1]
+    assert answering(port, 1, 2, seconds=0.02) == [1]
     assert port.receive(0.0) is None
-    assert 0.2 <= time.monotonic() - began < WAIT
+    assert 0.02 <= time.monotonic() - began < WAIT
     with pytest.raises(HardwareError, match="pi3hat is in use"):
         Pi3Hat(lambda: hat.buses)
     assert not port.trouble
     port.close()
 
 
+def test_braking_waits_neither_for_the_search_of_a_drive_nor_for_a_hat_that_hangs(monkeypatch):
+    monkeypatch.setattr("hopping_leg.deploy.transport._TURN_SECONDS", 1.0)
+    hat = Hat(Bench().robot)
+    port, brake = Pi3Hat(lambda: hat.buses), [Frame(3, b"\x01\x00\x0f")]
+    search = ThreadPoolExecutor().submit(answering, port, 3, seconds=60)
+    while len(hat.sent) < 3 or not port._turn.locked():
+        time.sleep(1e-3)
+    port.send(brake)
+    assert hat.sent == [*hat.buses, *hat.buses]
+    assert search.result() == []
+    port._turn.acquire()
+    port.send(brake)
+    assert "hangs" in port.trouble
+    port.close()
+    Pi3Hat(lambda: hat.buses).close()
+    port._runner.close()
+
+
 def test_a_pi3hat_with_two_drives_of_one_id_is_refused():
     port = Pi3Hat(lambda: Hat(Bench().robot, (1,), (1, 2)).buses)
     with pytest.raises(HardwareError, match="drives of id 1"):
-        answering(port, 1)
-    port.close()
+        answering(port, 1) + answering(port, 1)
+    port._hat.close = None
+    with pytest.raises(TypeError):
+        port.close()
+    Pi3Hat(lambda: Hat(None).buses).close()

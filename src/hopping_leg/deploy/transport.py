@@ -1,8 +1,8 @@
 """The adapters, for one host at a time: an fdcanusb, a bus of python-can, or a pi3hat.
 
-None of them ever waits beyond the time that it is given, whatever the adapter does. The client
-library's own wait for a lost reply without bound, lose the healthy drive's reply when they are
-cancelled, and are silenced by a line of noise.
+None of them waits beyond the time that it is given, whatever the adapter does; a pi3hat ends its
+cycle, which takes about 1 ms. The client library's own wait for a lost reply without bound,
+lose the healthy drive's reply when they are cancelled, and are silenced by a line of noise.
 """
 
 import asyncio
@@ -85,20 +85,24 @@ class PythonCan:
 
     def close(self) -> None:
         """Leave the bus."""
-        self._bus.shutdown()
-        self._lock.release()
+        try:
+            self._bus.shutdown()
+        finally:
+            self._lock.release()
 
 
-_SEND_SECONDS = 0.004  # A command that could not leave within this time is outdated
-_LEAST_SECONDS = 0.001  # In which what is asked leaves, also in a tick that began late
-_LONGEST_REPLY = 64  # bytes
+_MOST_SECONDS = 0.05  # That a wait for replies keeps another thread from sending
+_TURN_SECONDS = 0.2  # In which another thread's turn is over, unless the hat hangs
+_REST_SECONDS = 0.01  # In which the library's thread leaves Python; closed before, it deadlocks
 
 
 class Pi3Hat:
-    """A pi3hat's buses; a drive is asked on all of them until an answer tells where it is.
+    """A pi3hat's buses; a drive is told on all of them until an answer tells where it is.
 
     ``make`` returns the client library's devices, one a bus, whose event loop runs only while
-    something is asked of them. HardwareError says that the hat is in use or cannot be opened.
+    something is asked of them. The library would wait for each reply, and lose what it has heard
+    when that takes too long; so it is told of none, and asked what arrives. HardwareError says
+    that the hat is in use or cannot be opened.
     """
 
     def __init__(self, make: Callable[[], list[Any]]) -> None:
@@ -106,63 +110,57 @@ class Pi3Hat:
         self._lock = locks.named_lock("host-pi3hat", "pi3hat", HardwareError)
         buses = opened(self._lock.release, make)
         self._hat, self._safe = buses[0].parent(), [b for b in buses if b.empty_bus_tx_safe()]
-        self._found, self._asked = dict[int, list[Any]](), list[Frame]()
-        self._loop, self._turn = asyncio.new_event_loop(), threading.Lock()
+        self._found = dict[int, list[Any]]()
+        self._runner, self._turn = asyncio.Runner(), threading.Lock()
 
     def send(self, frames: Sequence[Frame]) -> None:
-        """Send frames; those that want a reply leave when it is received, as the hat needs it."""
-        self._asked = [frame for frame in frames if frame.wants_reply]
-        if requests := self._requests([frame for frame in frames if not frame.wants_reply]):
-            self._run(self._hat.transaction(requests), _SEND_SECONDS)
-
-    def receive(self, until: float) -> list[Frame] | None:
-        """Return what arrives next; HardwareError says that two drives have one id."""
-        asked, self._asked = self._asked, []
-        seconds = max(until - time.monotonic(), _LEAST_SECONDS)
-        if not asked:
-            heard = self._run(self._hat.receive_frame(), seconds)
-            return [Frame(heard.arbitration_id, bytes(heard.data))] if heard else None
-        requests, replies = self._requests(asked), list[Frame]()
-        self._run(self._hat.transaction(requests), seconds)
-        for bus, reply in ((r.child_device, reply) for r in requests for reply in r.responses):
-            replies.append(frame := Frame(reply.arbitration_id, bytes(reply.data)))
-            if (known := self._found.setdefault(frame.source, [bus])) != [bus]:
-                raise HardwareError(f"At {known[0]} and {bus} are drives of id {frame.source}.")
-        return replies or None
-
-    def close(self) -> None:
-        """Close the hat."""
-        self._hat.close()
-        self._loop.close()
-        self._lock.release()
-
-    def _requests(self, frames: Sequence[Frame]) -> list[Any]:
-        """Return what the library calls requests; it waits for what passes their filter."""
-        return [
-            moteus.TransportDevice.Request(
-                moteus.Frame(f.arbitration_id, padded(f.data)),
-                bus,
-                partial(_answers, f) if f.wants_reply else None,
-                _LONGEST_REPLY * f.wants_reply,
-            )
+        """Send frames, in a cycle of the hat, which takes about 1 ms."""
+        requests = [
+            moteus.TransportDevice.Request(moteus.Frame(f.arbitration_id, padded(f.data)), bus)
             for f in frames
             for bus in self._found.get(f.destination, self._safe)
         ]
+        self._run(self._hat.transaction(requests))
 
-    def _run(self, work: Coroutine[Any, Any, Any], seconds: float) -> Any:  # noqa: ANN401
+    def receive(self, until: float) -> list[Frame] | None:
+        """Return the next frame; HardwareError says that two drives have one id."""
+        seconds = min(until - time.monotonic(), _MOST_SECONDS)
+        heard = self._run(asyncio.wait_for(self._hat.receive_frame(), seconds))
+        if heard is None:
+            return [] if time.monotonic() < until else None
+        frame = Frame(heard.arbitration_id, bytes(heard.data))
+        if (known := self._found.setdefault(frame.source, [heard.channel])) != [heard.channel]:
+            raise HardwareError(
+                f"At {known[0]} and {heard.channel} are drives of id {frame.source}; give each"
+                " drive its own."
+            )
+        return [frame]
+
+    def close(self) -> None:
+        """Close the hat; the lock is given back also where the library fails or hangs."""
+        try:
+            if self._turn.acquire(timeout=_TURN_SECONDS):  # for good
+                self._runner.close()
+                time.sleep(_REST_SECONDS)
+                self._hat.close()
+        finally:
+            self._lock.release()
+
+    def _run(self, work: Coroutine[Any, Any, Any]) -> Any:  # noqa: ANN401
         """Return the result of work, None if it took too long or failed."""
-        with self._turn:  # a loop that hangs is braked from another thread
-            try:
-                return self._loop.run_until_complete(asyncio.wait_for(work, seconds))
-            except TimeoutError:
-                return None
-            except Exception as error:  # the library raises many types
-                self.trouble = str(error)
-                return None
-
-
-def _answers(asked: Frame, reply: Any) -> bool:  # noqa: ANN401
-    return Frame(reply.arbitration_id, b"").answers(asked)
+        if not self._turn.acquire(timeout=_TURN_SECONDS):  # a hanging loop's, which is braked
+            work.close()
+            self.trouble = "The pi3hat hangs, or is closed."
+            return None
+        try:
+            return self._runner.run(work)
+        except TimeoutError:
+            return None
+        except Exception as error:  # the library raises many types
+            self.trouble = str(error)
+            return None
+        finally:
+            self._turn.release()
 
 
 Transport = LineTransport | PythonCan | Pi3Hat
