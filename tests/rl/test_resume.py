@@ -38,7 +38,7 @@ def test_a_killed_training_ends_with_the_same_policy(name, tmp_path, monkeypatch
         module.train(recipe, ROBOT, 0, tmp_path / "cut", quiet=True)
     monkeypatch.setattr(module, "Trainer", trainer)
     cut = module.train(recipe, ROBOT, 0, tmp_path / "cut", quiet=True, resume=True)
-    assert cut.policy.read_bytes() == whole.policy.read_bytes()
+    assert cut.read_bytes() == whole.read_bytes()
 
 
 def test_only_whole_checkpoints_count_two_are_kept_and_no_code_in_them_runs(tmp_path):
@@ -61,12 +61,12 @@ def test_a_run_is_never_overwritten_or_mixed(tmp_path, monkeypatch):
     try_briefly(monkeypatch)
     recipe, out = TINY.replace(steps=64, eval_every=32, learning_starts=32), tmp_path / "run"
     done = module.train(recipe, ROBOT, 0, out, quiet=True)
-    content = done.policy.read_bytes()
+    content = done.read_bytes()
     for seed, resume, says in ((0, 0, "--resume"), (0, 1, "finished"), (1, 1, "another seed")):
         with pytest.raises(UsageError, match=says):
             module.train(recipe, ROBOT, seed, out, resume=bool(resume), quiet=True)
-    assert done.policy.read_bytes() == content
-    done.policy.unlink()
+    assert done.read_bytes() == content
+    done.unlink()
     write_checkpoint(out / "checkpoints", 64, {"learner": []})
     with pytest.raises(UsageError, match="another version"):
         module.train(recipe, ROBOT, 0, out, resume=True, quiet=True)
