@@ -35,7 +35,7 @@ VERBS = {
     "deploy": "run a controller on the real leg, or on emulated drives",
     "emulate": "stand in for the real leg: two drives behind a real wire",
     "doctor": "check, configure and home a leg's drives; compile what is compiled",
-    "view": "watch the leg in the browser: live, a trace, or the real one",
+    "view": "watch the leg in the browser: live, or a trace",
     "report": "draw what stored traces show",
     "export": "write a leg as URDF, a policy as ONNX, traces as MCAP",
     "reproduce": "the main job: record, identify, train, hop, evaluate, report",
