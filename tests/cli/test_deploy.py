@@ -99,7 +99,7 @@ def test_a_height_sensor_that_is_silent_is_named_before_the_leg_moves(emulate, t
 @pytest.mark.slow
 def test_a_fault_is_a_sentence_and_an_exit_code(emulate, tmp_path, refused):
     emulate(faults=(Fault("drive_fault", at=0.6, drive="hip", value=33),))
-    refused([*RUN, "--yes", "--out", tmp_path], "hip: fault 33 (motor driver)")
+    refused([*RUN, "--yes", "--out", tmp_path], "hip: fault 33 (motor driver)) The joints")
     assert len(list(tmp_path.glob("*.parquet"))) == 1
 
 

@@ -24,14 +24,11 @@ ANYTHING = st.floats(allow_nan=True, allow_infinity=True)
 NUMBERS = st.floats(-30, 30) | ANYTHING
 REPLIES = st.builds(
     Reply,
-    position=NUMBERS,
-    velocity=NUMBERS,
-    torque=NUMBERS,
+    **dict.fromkeys(("position", "velocity", "torque", "taken"), NUMBERS),
     mode=st.sampled_from([0, 1, 2, 3, 4, 10, 10, 10, 11, 12, 15]),
     fault=st.integers(0, 105),
     voltage=st.just(24.0) | NUMBERS,
     temperature=st.just(30.0) | NUMBERS,
-    taken=NUMBERS,
 )
 OBSERVATIONS = st.builds(
     SupervisorInput,
@@ -210,15 +207,18 @@ def test_arming_waits_for_both_drives_but_not_for_ever():
     assert memory.cause.reason is Reason.ARMING_TOOK_TOO_LONG
 
 
-def test_damping_ends_at_rest_or_after_its_time():
-    for speed, reason in ((0.0, Reason.CAME_TO_REST), (3.0, Reason.DAMPED_LONG_ENOUGH)):
+def test_damping_ends_at_rest_or_after_its_time_and_trusts_no_dead_encoder():
+    stop, dead, rest = Reason.OPERATOR_STOP, Reason.ENCODER_DEAD, Reason.CAME_TO_REST
+    for speed, why in (0.0, stop), (3.0, stop), (0.0, dead):
+        reason = rest if (speed, why) == (0.0, stop) else Reason.DAMPED_LONG_ENOUGH
         memory, _ = supervise(LIMITS, running(), seen(2, operator=Operator.STOP))
+        memory = replace(memory, stop_cause=replace(memory.stop_cause, reason=why))
         tick = 3
         while memory.state is State.DAMPING:
             memory, _ = supervise(LIMITS, memory, at(tick, 1, velocity=speed, mode=15))
             tick += 1
         assert memory.cause.reason is reason
-        assert memory.stop_cause.reason is Reason.OPERATOR_STOP
+        assert memory.stop_cause.reason is why
         memory, _ = supervise(LIMITS, memory, seen(tick, operator=Operator.ARM))
         assert memory.state is State.ARMING
 

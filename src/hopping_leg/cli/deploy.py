@@ -67,22 +67,19 @@ def run(args: Deploy) -> None:
     robot = load_robot(args.robot or robot_of([args.controller]))
     robot.require_leg()
     done = _perform(args, robot, _sequence(args, robot))
-    cause = done.outcome.supervisor.stop_cause
-    events = done.trace.header["events"]
+    state, events = done.outcome.supervisor, done.trace.header["events"]
+    reason, ending = state.stop_cause.reason, f"{state.stop_cause} {state.cause}"
+    squats = [event["squat"]["upward"] for event in events if "squat" in event]
     options.say(
         *done.notices,
         *(event["fallback"] for event in events if "fallback" in event),
-        *(
-            f"In its squat the leg carried {event['squat']['upward']:.0%} of its file's weight."
-            for event in events
-            if "squat" in event
-        ),
-        f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out.",
+        *(f"In its squat the leg carried {upward:.0%} of its file's weight." for upward in squats),
+        f"{ending} {done.outcome.ticks} ticks, {done.outcome.skipped} left out.",
     )
     options.say_written(done.path)
-    if cause.reason not in (stop_reasons.Reason.FINISHED, stop_reasons.Reason.OPERATOR_STOP):
+    if reason not in (stop_reasons.Reason.FINISHED, stop_reasons.Reason.OPERATOR_STOP):
         errors = [event.get("controller_error", "") for event in events]
-        words = [f"The leg was stopped: {cause}", *errors, done.complaint]
+        words = [f"The leg was stopped: {ending}", *errors, done.complaint]
         raise HardwareError(" ".join(filter(None, words)))
     if done.complaint:
         raise TraceError(done.complaint)

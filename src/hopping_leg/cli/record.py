@@ -242,11 +242,11 @@ def _measured(
                 beside=lambda loop: keyboard.keys(None, loop.stop, say),
             )  # fmt: skip
             say(*done.notices)
-            cause = done.outcome.supervisor.stop_cause
-            if cause.reason is not stop_reasons.Reason.FINISHED or done.complaint:
+            state = done.outcome.supervisor
+            if state.stop_cause.reason is not stop_reasons.Reason.FINISHED or done.complaint:
                 raise HardwareError(
-                    f"{name} was stopped: {cause} {done.complaint} Its trace is {done.path}."
+                    f"{name} was stopped: {state.stop_cause} {state.cause} {done.complaint} Its"
+                    f" trace is {done.path}."
                 )
-            file = f"{robot.name}-{name}.parquet"
-            filed = {"believed": believed, "name": file}
+            filed = {"believed": believed, "name": f"{robot.name}-{name}.parquet"}
             yield name, recording_of(done.trace, excitation, gains=gains, **filed)

@@ -27,7 +27,7 @@ class Reason(IntEnum):
     DRIVES_READY = 2, "Both drives follow torques."
     FINISHED = 3, "The sequence is over."
     CAME_TO_REST = 4, "The joints are at rest."
-    DAMPED_LONG_ENOUGH = 5, "The drives braked for the whole time that they are given."
+    DAMPED_LONG_ENOUGH = 5, "The joints may still move: look before you touch."
     OPERATOR_STOP = 10, "The operator asked for a stop."
     ARMING_TOOK_TOO_LONG = 11, "A drive did not begin to follow torques in time."
     DRIVE_FAULT = 12, "A drive reports a fault."

@@ -30,6 +30,7 @@ class State(IntEnum):
 
 _NOTHING_YET = Cause(Reason.NONE)
 _NO_COUNTS = stop_reasons.Counts()
+_UNTRUE = (Reason.ENCODER_DEAD, Reason.VELOCITY_FALSE)  # After these no reply tells of rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +62,7 @@ def supervise(
     state, cause = _next(limits, before, counts, seen)
     outgoing = _outgoing(limits, state, seen)
     since, stop_cause = before.since, before.stop_cause
-    if state is before.state:
-        cause = before.cause
-    else:
+    if state is not before.state:
         since, stop_cause = seen.time, cause if state is State.DAMPING else stop_cause
     return SupervisorState(state, since, cause, stop_cause, counts, outgoing.torque), outgoing
 
@@ -111,10 +110,8 @@ def _calm_down(
     limits: SafetyLimits, before: SupervisorState, seen: SupervisorInput
 ) -> tuple[State, Cause]:
     elapsed = seen.time - before.since
-    resting = all(
-        reply is not None and abs(reply.velocity) <= limits.rest_speed for reply in seen.replies
-    )
-    if resting and elapsed >= limits.damping_least:
+    resting = all(reply and abs(reply.velocity) <= limits.rest_speed for reply in seen.replies)
+    if resting and elapsed >= limits.damping_least and before.stop_cause.reason not in _UNTRUE:
         return State.STOPPED, Cause(Reason.CAME_TO_REST)
     if not elapsed <= limits.damping_most:
         return State.STOPPED, Cause(Reason.DAMPED_LONG_ENOUGH)
