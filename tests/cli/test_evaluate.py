@@ -24,10 +24,7 @@ def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys)
     assert data["secondary"]["conditions"]["floor"] == "stiff"
     assert b"hop evaluate spring --commands 0.3 --seeds 1" in (out / "report.html").read_bytes()
     traces = sorted((out / "traces").iterdir())
-    assert [path.name for path in traces] == [
-        "spring-fixed-0.300-0.parquet",
-        "spring-ladder-0.300-0.parquet",
-    ]
+    assert [p.name for p in traces] == [f"spring-{k}-0.300-0.parquet" for k in ("fixed", "ladder")]
     assert Trace.load(traces[0]).header["controller"] == "spring"
     assert "spring" in capsys.readouterr().out
     figures = tmp_path / "figures"
@@ -77,5 +74,7 @@ def test_a_policy_is_judged_on_the_robot_that_lies_beside_it(tmp_path, monkeypat
     assert main(["evaluate", str(file), "--robot", "legv2", *short]) == 0
     said = capsys.readouterr().out
     assert said.index("was trained on robot 'my-leg'") < said.index("soft floor")
-    (folder / ROBOT_FILE).unlink()
+    (folder / ROBOT_FILE).rename(leg := folder / "leg.toml")
     assert robot_of([str(file)]) == DEFAULT_ROBOT
+    file.with_suffix(".toml").write_text('robot = "leg.toml"')
+    assert robot_of([str(file)]) == str(leg)

@@ -9,6 +9,7 @@ from hopping_leg.controllers import energy_shaping, mpc, protocol, user_controll
 from hopping_leg.controllers.energy_shaping.gains import load_gains
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import PolicyError, UsageError, unknown_name
+from hopping_leg.io import parse_toml
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot, shipped_robots
 from hopping_leg.sim import CONTROL_RATE
 
@@ -70,18 +71,20 @@ def load_policy(name_or_path: str | Path) -> Policy:
 def robot_of(controllers: Sequence[str]) -> str:
     """Return the robot that the first policy or gain file among controllers was made for alone.
 
-    It is a shipped name, or the file that a training leaves beside its policy; without any, the
-    default robot.
+    It is a shipped name, or the file that a training leaves beside its policy or that ``NAME.toml``
+    there names; without any, the default robot.
     """
     for text in controllers:
         name = text if Path(text).exists() else text.rpartition("=")[2]
         if name in shipped_policies() or (name.endswith(POLICY_FILES) and Path(name).is_file()):
             policy = load_policy(name)
             if not policy.for_any_leg:
-                card, beside = policy.card, Path(name).with_name(ROBOT_FILE)
+                card, told = policy.card, Path(name).with_suffix(".toml")
+                own = parse_toml(told.read_bytes(), str(told)) if told.is_file() else {}
+                files = [told.with_name(ROBOT_FILE), told.parent / str(own.get("robot", ""))]
                 shipped = [card.robot] if card.robot in shipped_robots() else []
-                files = [str(beside)] if beside.is_file() else []
-                fit = (r for r in shipped + files if load_robot(r).has_digest(card.robot_digest))
+                there = [*shipped, *map(str, filter(Path.is_file, files))]
+                fit = (r for r in there if load_robot(r).has_digest(card.robot_digest))
                 return next(fit, shipped[0] if shipped else DEFAULT_ROBOT)
         if name.endswith(".toml") and Path(name).is_file():
             robot = load_gains(name).robot
