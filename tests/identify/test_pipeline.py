@@ -147,6 +147,7 @@ STRONG = {"stiffness": (800.0, 800.0), "damping": (0.0, 0.0)}
         ([FIXED, STANDING], "rail.friction", "drive.knee.stiffness"),
         ([FIXED, STANDING], "contact.time_constant", "hip.armature"),
         ([on(onboard="zoh", stiffness=None)], "drive.knee.stiffness", "drive.knee.damping"),
+        ([on(onboard="zoh", stiffness=None)], "drive.hip.stiffness", "knee.torque_gain"),
         ([on(gains_exact=False)], "drive.knee.stiffness", "hip.motor.peak_torque"),
         ([on(gains_exact=False, **STRONG)], "hip.motor.peak_torque", "knee.load_friction"),
         ([on(gains_exact=False, **STRONG)], "knee.motor.no_load_speed", "rail.friction"),
@@ -199,7 +200,7 @@ TURNED = (*ANGLES, "velocity", "velocity_command")
         (ANGLES, lambda column: column + np.pi, "zoh", "zero"),
         (TURNED, lambda column: column / (2 * np.pi), "zoh", "revolutions for radians"),
         (("position",), lambda column: column * None, "zoh", "no positions of the .*both joints"),
-        (COMMANDS, lambda column: column * None, "torque", "has no commanded torques"),
+        (COMMANDS, lambda column: column * None, "torque", "no commanded torques .*onboard"),
         (COMMANDS, lambda column: column * None, "continuous", "has no targets of its"),
     ],
 )

@@ -41,7 +41,8 @@ def check_recordings(recordings: Sequence[Recording], robot: Robot) -> None:
             wanted, what = "torque_command", "commanded torques"
         if not recording.has(wanted):
             names = ", ".join(recording_format.PAIRS[wanted])
-            raise RecordingError(f"{recording.name} has no {what} ({names}); record them.")
+            remedy = "record them, or correct 'onboard' in its sidecar"
+            raise RecordingError(f"{recording.name} has no {what} ({names}); {remedy}.")
         with contextlib.suppress(RobotError):  # filed under a robot that is not here
             own = load_robot(recording.metadata.robot)
             lengths, given = ((r.thigh.length, r.shank.length) for r in (own, robot))
@@ -162,7 +163,7 @@ def _names(recordings: Sequence[Recording], gains: list[str]) -> list[str]:
     grounded = any(r.metadata.rig != "fixed-base" for r in recordings)
     if all(commanded) or (grounded and np.logical_or(commanded, measured).all()):
         names += [f"{joint}.load_friction" for joint in JOINTS]
-    if all(measured):
+    if all(measured) and not gains:  # of which torques tell the product with the motor's alone
         names += [f"{joint}.torque_gain" for joint in JOINTS]
     return [*names, *_limits(recordings), *gains]
 
