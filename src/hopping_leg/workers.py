@@ -3,11 +3,13 @@
 import os
 import signal
 import socket
+import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, Self, TypeVar
@@ -104,14 +106,22 @@ class RayWorkers:
                     f"There is no Ray cluster at {address or 'local'}: {str(error).rstrip('.')};"
                     " start one with `ray start --head`, or leave the address out."
                 ) from error
+        for name in [name for name in sys.modules if name.startswith("hopping_leg_user_file_")]:
+            # Other processes cannot import it: its code goes with what is sent.
+            ray.cloudpickle.register_pickle_by_value(sys.modules[name])
         self.count = max(1, int(ray.cluster_resources().get("CPU", 1)))
 
     def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> Iterator[R]:
         """As ``ProcessWorkers`` does; a task that dies begins again, the function is sent once."""
         sent, task = self._ray.put(function), self._ray.remote(lambda f, *values: f(*values))
         begun = (task.remote(sent, *values) for values in arguments)
-        try:
+        with self._one_sentence():
             yield from _in_order(begun, self._ray.get, self.count)
+
+    @contextmanager
+    def _one_sentence(self) -> Iterator[None]:
+        try:
+            yield
         except self._ray.exceptions.RayTaskError as error:
             if isinstance(error.cause, HoppingLegError):
                 raise error.cause from None
@@ -119,7 +129,7 @@ class RayWorkers:
         except self._ray.exceptions.RayError as error:
             raise UsageError(
                 f"A worker of the Ray cluster died: {str(error).splitlines()[0].rstrip('.')}; call"
-                " the same command again to go on."
+                " the same command again to go on, a training with --resume."
             ) from error
 
 
@@ -131,6 +141,51 @@ def _in_order(begun: Iterator[T], result: Callable[[T], R], count: int) -> Itera
         if len(waiting) == 2 * count:
             yield result(waiting.popleft())
     yield from map(result, waiting)
+
+
+class WorkerGroup:
+    """Objects of a kind, one for each of some arguments, that take turns in this process, ``here``.
+
+    With a Ray cluster, those beyond the first work there at once, on a CPU each; UsageError says
+    that it has too few.
+    """
+
+    def __init__(
+        self, kind: type[Any], arguments: Sequence[tuple[Any, ...]], address: str | None = None
+    ) -> None:
+        self.count, self._there = len(arguments), list[Any]()
+        if address is not None:
+            self._cluster = RayWorkers(address)
+            if self.count - 1 > self._cluster.count:
+                raise UsageError(
+                    f"{self.count} workers need one CPU less on the cluster, beside this process,"
+                    f" which has {self._cluster.count}; give fewer."
+                )
+            actor = self._cluster._ray.remote(num_cpus=1)(kind)
+            self._there = [actor.remote(*values) for values in arguments[1:]]
+        self.here = [kind(*values) for values in arguments[: self.count - len(self._there)]]
+
+    def call(self, method: str, *shared: Any, each: Sequence[Any] | None = None) -> list[Any]:  # noqa: ANN401
+        """Call all with what is ``shared`` and their own of ``each``; return results in order."""
+        own = [()] * self.count if each is None else [(value,) for value in each]
+        begun, here = [], zip(self.here, own, strict=False)
+        if self._there:
+            sent = [self._cluster._ray.put(value) for value in shared]
+            others = zip(self._there, own[1:], strict=True)
+            begun = [getattr(one, method).remote(*sent, *values) for one, values in others]
+        found = [getattr(one, method)(*shared, *values) for one, values in here]
+        if begun:
+            with self._cluster._one_sentence():
+                found += self._cluster._ray.get(begun)
+        return found
+
+    def state(self) -> list[Any]:
+        """Return the ``state`` of each."""
+        return self.call("state")
+
+    def restore(self, states: Sequence[Any]) -> None:
+        """Let each go on from its ``state``."""
+        self.call("restore", each=states)
 
 
 Workers = ProcessWorkers | RayWorkers

@@ -36,7 +36,7 @@ TINY_RL = RL.replace(
     num_envs=4, steps=768, n_steps=16, batch_size=32, actor=(8, 8), critic=(8, 8), calibrations=1,
     heights=(0.28, 0.32), eval_commands=(0.28, 0.32),
 )  # fmt: skip
-EVERY = {"sac": TINY, "ppo": TINY_RL, **STUDENTS}
+EVERY = {"sac": TINY, "ppo": TINY_RL.replace(workers=2), **STUDENTS}
 TINY_UNIVERSAL = UNIVERSAL.replace(
     num_envs=4, steps=2048, n_steps=32, buffer_size=512, gradient_steps=4, batch_size=64,
     hidden=(8,), size=8, mixing_share=0.4, eval_commands=(0.28, 0.32),

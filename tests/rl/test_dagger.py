@@ -88,8 +88,7 @@ def test_a_policy_file_acts_on_measurements_as_the_student_did(recipe):
     task.step = lambda action: (
         measured.append(task.measurement), asked.append(np.array(action)), step(action)
     )[2]  # fmt: skip
-    made._left = 0.5
-    made._collect()
+    made.collectors.call("collect", made._actor, 0.5)
     for tick, (seen, action) in enumerate(zip(measured, asked, strict=True)):
         if tick % 20 == 0:
             file.reset(task.count)
@@ -99,10 +98,10 @@ def test_a_policy_file_acts_on_measurements_as_the_student_did(recipe):
 
 def test_the_teacher_acts_at_first_and_ever_less_until_the_student_is_alone():
     made = learner(counted(mixing_share=0.5))
-    shares, taught, step = [], [], made.task.step
+    shares, taught, step, (collector,) = [], [], made.task.step, made.collectors.here
 
     def watched(action):
-        taught[-1].append((action == made._label).all(axis=1).mean())
+        taught[-1].append((action == collector._label).all(axis=1).mean())
         return step(action)
 
     made.task.step = watched
@@ -125,22 +124,25 @@ def test_a_clock_hastens_the_schedules_and_never_delays_them():
 
 
 def test_the_label_is_what_mpc_does_in_the_true_state():
-    made = learner(TINY_FAST)
+    (made,) = learner(TINY_FAST).collectors.here
     other = TINY_FAST.algorithm.make_teacher(made.task)
     other.watch(made.task.legs)
     other.reset(made.task.count)
     for _ in range(40):
         wanted = (other.torque(made.task.command) / FULL).clip(-1, 1)
         np.testing.assert_allclose(made._label, wanted, atol=1e-6)
-        made._step()
+        made._step(lambda seen, memory: (torch.zeros(len(seen), 2), memory), 0.5)
     made.task.legs.height += 0.01
     assert not np.allclose(made._teach(), made._label, atol=1e-3)
 
 
 def test_training_goes_beyond_the_highest_command():
     low, high = TINY_FAST.task.command_range
-    made = learner(TINY_FAST.replace({"task.command_resampling_time": (0.02, 0.1)}, headroom=0.05))
-    commands = [made.task.command.copy() for _ in range(200) if made._step()]
+    recipe = TINY_FAST.replace({"task.command_resampling_time": (0.02, 0.1)}, headroom=0.05)
+    task, commands = learner(recipe).task, []
+    for _ in range(200):
+        task.step(np.zeros((4, 2)))
+        commands.append(task.command.copy())
     assert low <= np.min(commands)
     assert high + 0.03 < np.max(commands) <= high + 0.05
 
@@ -173,7 +175,7 @@ def test_a_push_counts_more_and_what_is_hidden_is_guessed():
     state = {k: np.asarray(v) for k, v in made._buffer.state().items()}
     config = TINY_UNIVERSAL.algorithm
     assert set(np.unique(state["weights"])) == {1.0, config.push_weight, config.fold_weight}
-    hidden = state["hidden"].reshape(-1, made._hidden.size)
+    hidden = state["hidden"].reshape(-1, made.collectors.here[0].hidden.size)
     batch, _, guesses = made.student.recall(made._buffer, 64, made._draws)
     assert guesses.shape == batch.hidden.shape
     assert (hidden[:, :OF_MOTION].std(axis=0) > 0).all()
@@ -182,13 +184,13 @@ def test_a_push_counts_more_and_what_is_hidden_is_guessed():
 
 def test_some_bases_are_pushed_for_single_control_periods_unseen_by_the_teacher():
     recipe = TINY_FAST.replace(num_envs=128, impulse=0.5, buffer_size=128 * 16)
-    made = learner(recipe)
+    learning = learner(recipe.replace(n_steps=200))
+    (made,) = learning.collectors.here
     legs, teach, forces = made.task.legs, made._teach, []
     made._teach = lambda: (np.testing.assert_equal(legs._push, 0.0), teach())[1]
     push = legs.push
     legs.push = lambda force: (forces.append(force.copy()), push(force))
-    for _ in range(200):
-        made._step()
+    made.collect(learning._actor, 0.5)
     pushed = np.array(forces[::2])
     impulses, often = pushed / made.task.options.rate, (pushed != 0).mean(axis=0)
     most = 0.5 * ROBOT.mass * np.sqrt(9.81 * (ROBOT.thigh.length + ROBOT.shank.length))

@@ -102,11 +102,6 @@ def with_motors(**factors):
     return dataclasses.replace(ROBOT, name="changed", **joints)
 
 
-def test_a_recipe_without_drawn_legs_has_nothing_for_a_cluster(tmp_path):
-    with pytest.raises(UsageError, match="the recipe fast has none; leave it out"):
-        find_legs(FAST, 0, tmp_path / "legs.json", 1, "local", print)
-
-
 def test_a_recipe_without_a_teacher_stays_as_it_is():
     paper = RECIPES["paper"]
     assert within_reach(paper, ROBOT) == paper

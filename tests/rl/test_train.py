@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers.policy import Policy
-from hopping_leg.errors import RobotError
+from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.io import replace_at
 from hopping_leg.rl import reach
+from hopping_leg.rl.recipes import get_recipe
 from hopping_leg.rl.run_folder import RunFolder
 from hopping_leg.rl.train import train
 from hopping_leg.robot import load_robot
@@ -41,3 +42,17 @@ def test_a_run_is_known_by_what_was_asked_and_its_card_says_what_is_in_reach(tmp
     assert (card.command_low, card.command_high) == (0.28, 0.30)
     told = (tmp_path / "model_card.md").read_text()
     assert "\namong them the age of each joint sample, which the paper's 15 lack" in told
+
+
+def test_workers_that_do_not_fit_are_refused_before_anything_is_written(tmp_path):
+    for name, workers, ray, says in (
+        ("rl", 3, None, "num_envs, 1024, must be a multiple of workers, 3"),
+        ("fast", 0, None, "must be a multiple of workers, 0"),
+        ("fast", 1, "local", "more than one worker"),
+        ("paper", 1, "local", "one worker, here; leave workers and --ray out"),
+        ("paper", 2, None, "one worker, here; leave workers and --ray out"),
+    ):
+        recipe = get_recipe(name).replace(workers=workers)
+        with pytest.raises(UsageError, match=says):
+            train(recipe, ROBOT, 0, tmp_path / "run", ray=ray)
+    assert not (tmp_path / "run").exists()

@@ -58,8 +58,8 @@ class Options:
     threads: int = 1
     """Threads of the networks and the physics."""
     ray: str | None = None
-    """Address of a Ray cluster that finds out what the teacher reaches on legs of any size, for
-    `universal`; `local` starts one here. Default: processes of this machine."""
+    """Address of a Ray cluster that collects the rollouts of all workers but the first, see
+    `--set workers=4`, and tries the legs of `universal`; `local` starts one here."""
     json: JsonFile = None
 
 

@@ -18,19 +18,15 @@ import numpy as np
 import torch
 from torch.nn import functional
 
-from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.arrays import Array, Array32, BoolArray, Stateful
 from hopping_leg.controllers import robot_numbers
 from hopping_leg.controllers.mpc import HopShape, Planning, TrueStateMpc
 from hopping_leg.envs.hidden_state import HiddenState
 from hopping_leg.envs.task import HoppingTask, Step
-from hopping_leg.rl.learner import Learner
-from hopping_leg.rl.students import (
-    LabelledRollout,
-    RolloutBuffer,
-    Student,
-    StudentConfig,
-)
+from hopping_leg.rl.learner import Learner, MakeTask
+from hopping_leg.rl.students import LabelledRollout, RolloutBuffer, Student, StudentConfig
 from hopping_leg.robot import GRAVITY
+from hopping_leg.workers import WorkerGroup
 
 _PUSHED, _PUSHES = 0.15, 0.5
 """Share of the environments that push the base, and how often these do, 1/s."""
@@ -81,38 +77,21 @@ class DaggerConfig:
         return TrueStateMpc(task.robot, self.teacher, self.planning, rate=task.options.rate)
 
 
-class Dagger(Learner):
-    """A distillation; rollouts and gradient steps run side by side.
-
-    Everything random follows from the seed, on any number of cores.
-    """
+class LabelCollector(Stateful):
+    """Collects rollouts with what the teacher would have done."""
 
     STATE = (
-        *("student", "optimizer", "task", "teacher", "num_timesteps", "_buffer", "_hidden"),
-        *("_seen", "_begun", "_held", "_posture", "_memory", "_label", "_draws", "_mixing"),
+        *("task", "teacher", "hidden", "_mixing"),
+        *("_seen", "_begun", "_held", "_posture", "_memory", "_label"),
     )
 
-    def __init__(
-        self, task: HoppingTask, config: DaggerConfig, network: StudentConfig, seed: int
-    ) -> None:
-        super().__init__(task)
-        torch.manual_seed(seed)
-        self.config = config
-        self._hidden = HiddenState(task.legs, task.believed) if config.hidden_weight else None
-        unseen = self._hidden.size if self._hidden else 0
-        self.student = network.make(task.observation, unseen)
-        self.optimizer = torch.optim.Adam(self.student.parameters(), lr=config.learning_rate)
+    def __init__(self, make_task: MakeTask, config: DaggerConfig, seed: int, number: int) -> None:
+        self.task, self.config = make_task(), config
+        task = self.task
+        self.hidden = HiddenState(task.legs, task.believed) if config.hidden_weight else None
         self.teacher = config.make_teacher(task)
         self.teacher.watch(task.legs)
-        self._actor: Student = copy.deepcopy(self.student)
-        self._actor.correction = 0.0
-        size = config.n_steps * task.count
-        self._buffer = RolloutBuffer(
-            config.buffer_size // size, config.n_steps, task.count, task.observation.size,
-            self.student.memory_size, unseen,
-        )  # fmt: skip
-        self._draws = torch.Generator().manual_seed(seed)
-        self._mixing = np.random.default_rng([seed, 1])
+        self._mixing = np.random.default_rng([seed, 1, number])
         self._most_force: Array | None = None
         """Largest force on each base, N, (n,), 0 for most; None where none is pushed."""
         if config.impulse:
@@ -126,40 +105,31 @@ class Dagger(Learner):
         self.teacher.reset(task.count)
         self._begun: BoolArray = np.ones(task.count, np.bool_)
         self._held, self._posture = np.zeros(task.count), np.zeros((task.count, 2))
-        self._memory = torch.zeros(task.count, self.student.memory_size)
+        self._memory: Array32 = np.zeros((task.count, 0), np.float32)
         self._label = self._teach()
 
-    def train_until(self, steps: int, callback: Callable[[], bool], log_interval: int) -> None:
-        """Learn until so many control steps are done in all, or until the callback says no."""
-        size = self.config.n_steps * self.task.count
-        with ThreadPoolExecutor(1, thread_name_prefix="rollout") as beside:
-            for _ in self._rollouts(size, steps, callback, log_interval):
-                self._actor.load_state_dict(self.student.state_dict())
-                rollout = beside.submit(self._collect)
-                self._train()
-                self._buffer.add(rollout.result())
+    def collect(self, actor: Student, share: float) -> LabelledRollout:
+        """Let the student act, and the teacher by what share of the training is done."""
+        if not self._memory.size:
+            self._memory = np.zeros((self.task.count, actor.memory_size), np.float32)
+        memory, helped = self._memory[None], 1 - share / self.config.mixing_share
+        ticks = [self._step(actor, helped) for _ in range(self.config.n_steps)]
+        return LabelledRollout._make([*map(np.stack, zip(*ticks, strict=True)), memory])
 
-    def _collect(self) -> LabelledRollout:
-        began = time.monotonic()
-        memory = self._memory.numpy().copy()
-        ticks = [self._step() for _ in range(self.config.n_steps)]
-        seen, labels, weights, hidden, begun = (np.stack(p) for p in zip(*ticks, strict=True))
-        self.seconds["rollouts"] += time.monotonic() - began
-        return LabelledRollout(seen, labels, weights, hidden, begun, memory)
-
-    def _step(self) -> tuple[Any, ...]:
+    def _step(self, actor: Student, helped: float) -> tuple[Any, ...]:
         seen, label, begun, config = self._seen, self._label, self._begun, self.config
         pushing = np.where(self.teacher.pushing, config.push_weight, 1.0)
         weight = np.where(self.teacher.folding, config.fold_weight, pushing)
-        hidden = self._hidden.view() if self._hidden else np.empty((len(begun), 0), np.float32)
+        hidden = self.hidden.view() if self.hidden else np.empty((len(begun), 0), np.float32)
+        memory = torch.from_numpy(self._memory * ~begun[:, None])
         with torch.no_grad():
-            fresh = torch.from_numpy(~begun)[:, None]
-            action, self._memory = self._actor(torch.from_numpy(seen), self._memory * fresh)
+            action, remembered = actor(torch.from_numpy(seen), memory)
         # Leg by leg and tick by tick the teacher acts for the student, ever less often.
-        taught = self._mixing.random(len(begun)) < max(0.0, 1 - self.share / config.mixing_share)
+        taught = self._mixing.random(len(begun)) < helped
         step = self._act(np.where(taught[:, None], label, action.numpy()))
-        if self._hidden:
-            self._hidden.update(step.apex_error, step.terminated | step.truncated)
+        if self.hidden:
+            self.hidden.update(step.apex_error, step.terminated | step.truncated)
+        self._memory = remembered.numpy()
         self._seen, self._begun = step.observation, step.terminated | step.truncated
         self._label = self._teach()
         return seen, label, weight.astype(np.float32), hidden, begun
@@ -192,6 +162,42 @@ class Dagger(Learner):
         torque = self.teacher.torque(self.task.command)
         return (torque / self.task.full_torque).clip(-1, 1).astype(np.float32)
 
+
+class Dagger(Learner):
+    """A distillation; rollouts and gradient steps run side by side.
+
+    Everything random follows from the seed, on any number of cores.
+    """
+
+    STATE = ("student", "optimizer", "collectors", "num_timesteps", "_buffer", "_draws")
+
+    def __init__(
+        self, collectors: WorkerGroup, config: DaggerConfig, network: StudentConfig, seed: int
+    ) -> None:
+        super().__init__(collectors)
+        torch.manual_seed(seed)
+        self.config, seen = config, self.task.observation
+        unseen = collectors.here[0].hidden.size if config.hidden_weight else 0
+        self.student = network.make(seen, unseen)
+        self.optimizer = torch.optim.Adam(self.student.parameters(), lr=config.learning_rate)
+        self._actor: Student = copy.deepcopy(self.student)
+        self._actor.correction = 0.0
+        kept = config.buffer_size // (config.n_steps * self.count)
+        self._buffer = RolloutBuffer(
+            kept, config.n_steps, self.count, seen.size, self.student.memory_size, unseen
+        )
+        self._draws = torch.Generator().manual_seed(seed)
+
+    def train_until(self, steps: int, callback: Callable[[], bool], log_interval: int) -> None:
+        """Learn until so many control steps are done in all, or until the callback says no."""
+        size = self.config.n_steps * self.count
+        with ThreadPoolExecutor(1, thread_name_prefix="rollout") as beside:
+            for _ in self._rollouts(size, steps, callback, log_interval):
+                self._actor.load_state_dict(self.student.state_dict())
+                rollout = beside.submit(self._collect_all, self._actor, self.share)
+                self._train()
+                self._buffer.add(LabelledRollout(*rollout.result()))
+
     def _train(self) -> None:
         if not self._buffer.added:
             return
@@ -214,7 +220,7 @@ class Dagger(Learner):
         else:
             off = functional.mse_loss(actions, batch.labels, reduction="none")
         loss = (off.mean(dim=-1) * batch.weights).sum() / batch.weights.sum()
-        if self._hidden:
+        if config.hidden_weight:
             known = (batch.weights > 0)[..., None]
             missed = functional.mse_loss(guesses * known, batch.hidden * known)
             loss = loss + config.hidden_weight * missed

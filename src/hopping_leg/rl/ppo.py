@@ -18,9 +18,10 @@ import torch
 from stable_baselines3.common.torch_layers import create_mlp
 from torch import nn
 
-from hopping_leg.envs.task import HoppingTask
-from hopping_leg.rl.learner import Learner, NetworkConfig
+from hopping_leg.arrays import Array32, Stateful
+from hopping_leg.rl.learner import Learner, MakeTask, NetworkConfig
 from hopping_leg.rl.onnx_export import Actor, DenseActor
+from hopping_leg.workers import WorkerGroup
 
 _LEAST_RATE, _MOST_RATE = 1e-5, 3e-3  # between which the learning rate adapts
 _AVERAGED = 0.97  # share that an update leaves of the actors' mean so far, which is the policy
@@ -52,10 +53,6 @@ class PPOConfig:
     log_std_until: float = 0.7
     """Share of the training with which it has fallen."""
 
-    def make_learner(self, task: HoppingTask, network: NetworkConfig, seed: int) -> "PPO":
-        """Build PPO on the task."""
-        return PPO(task, self, network, seed)
-
 
 class Rollout(NamedTuple):
     """Some control periods of n environments, in torch."""
@@ -66,18 +63,49 @@ class Rollout(NamedTuple):
     """What the critic sees, before every tick and after the last, (ticks + 1, n, k)."""
     actions: torch.Tensor
     """(ticks, n, 2)."""
-    noise: torch.Tensor
-    """Of the actions, standard normal, (ticks, n, 2)."""
     rewards: torch.Tensor
     """(ticks, n)."""
     ended: torch.Tensor
     """1 where an episode ended with the tick, (ticks, n)."""
     final: torch.Tensor
-    """What the critic sees of the ends, (e, k)."""
+    """What the critic sees of the legs where any episode ended with the tick, (ticks, n, k)."""
     truncated: torch.Tensor
-    """1 where the end's time was up and 0 where the leg fell, (e,)."""
+    """1 where an episode ended as its time was up, not as the leg fell, (ticks, n)."""
+    noise: torch.Tensor
+    """Of the actions, standard normal, (ticks, n, 2)."""
     std: torch.Tensor
     """Standard deviation of the actions, a number."""
+
+
+class RolloutCollector(Stateful):
+    """Collects what a ``Rollout`` holds, apart from noise, as arrays."""
+
+    STATE = ("task", "_seen")
+
+    def __init__(self, make_task: MakeTask, config: PPOConfig, *_: int) -> None:
+        self.task, self.config = make_task(), config
+        self._seen = self.task.reset()
+
+    @torch.no_grad()
+    def collect(self, actor: nn.Module, share: float, std: float, noise: Array32) -> list[Array32]:
+        """Let the actor act, with noise (ticks, n, 2), at a share of the training."""
+        task = self.task
+        task.reward.anneal(share)
+        states = [task.privileged()]
+        final = np.zeros((self.config.n_steps, *states[0].shape), np.float32)
+        ticks = []
+        for tick, drawn in enumerate(noise):
+            seen, action = self._seen, actor(torch.from_numpy(self._seen)).numpy() + std * drawn
+            step = task.step(action)
+            if step.final_privileged is not None:
+                final[tick] = step.final_privileged
+            self._seen = step.observation
+            states.append(task.privileged())
+            ended = step.terminated | step.truncated
+            ticks.append((seen, action, step.reward, ended, step.truncated))
+        stacked = (np.stack(part, dtype=np.float32) for part in zip(*ticks, strict=True))
+        observations, actions, rewards, ends, truncated = stacked
+        return [observations, np.stack(states), actions, rewards, ends, final, truncated]
 
 
 class PPO(Learner):
@@ -87,19 +115,18 @@ class PPO(Learner):
     """
 
     STATE = (
-        *("actor", "critic", "optimizer", "task", "num_timesteps"),
-        *("_average", "_rate", "_draws", "_seen"),
+        *("actor", "critic", "optimizer", "collectors", "num_timesteps"),
+        *("_average", "_rate", "_draws"),
     )
 
     def __init__(
-        self, task: HoppingTask, config: PPOConfig, network: NetworkConfig, seed: int
+        self, collectors: WorkerGroup, config: PPOConfig, network: NetworkConfig, seed: int
     ) -> None:
-        super().__init__(task)
+        super().__init__(collectors)
         torch.manual_seed(seed)
         self.config = config
-        self.actor = _mlp(task.observation.size, network.actor, 2)
-        self._seen = task.reset()
-        self.critic = _mlp(task.privileged_size, network.critic, 1)
+        self.actor = _mlp(self.task.observation.size, network.actor, 2)
+        self.critic = _mlp(self.task.privileged_size, network.critic, 1)
         head = list(self.actor.parameters())[-2:]
         with torch.no_grad():
             head[0].mul_(0.01)
@@ -112,43 +139,20 @@ class PPO(Learner):
 
     def train_until(self, steps: int, callback: Callable[[], bool], log_interval: int) -> None:
         """Learn until so many control steps are done in all, or until the callback says no."""
-        size = self.config.n_steps * self.task.count
+        size = self.config.n_steps * self.count
         for _ in self._rollouts(size, steps, callback, log_interval):
-            self.task.reward.anneal(self.share)
             rollout = self._collect()
             self._train(rollout)
             self.logger.record("rollout/reward", float(rollout.rewards.mean()))
 
-    @torch.no_grad()
     def _collect(self) -> Rollout:
-        began, task, config = time.monotonic(), self.task, self.config
+        config = self.config
         first, last = config.log_std
         std = math.exp(first + (last - first) * min(1.0, self.share / config.log_std_until))
-        noise = torch.randn((config.n_steps, task.count, 2), generator=self._draws)
-        ticks, states, finals, truncated = [], [task.privileged()], [], []
-        for tick in range(config.n_steps):
-            seen = torch.from_numpy(self._seen)
-            action = self.actor(seen) + std * noise[tick]
-            step = task.step(action.numpy())
-            ended = step.terminated | step.truncated
-            if step.final_privileged is not None:
-                rows = np.flatnonzero(ended)
-                finals.append(step.final_privileged[rows])
-                truncated.append(step.truncated[rows].astype(np.float32))
-            self._seen = step.observation
-            states.append(task.privileged())
-            reward = torch.from_numpy(step.reward.astype(np.float32))
-            ticks.append((seen, action, reward, torch.from_numpy(ended.astype(np.float32))))
-        observations, actions, rewards, ends = map(torch.stack, zip(*ticks, strict=True))
-        none = [np.empty((0, states[0].shape[1]), np.float32)]
-        rollout = Rollout(
-            observations, torch.from_numpy(np.stack(states)), actions, noise, rewards, ends,
-            torch.from_numpy(np.concatenate(finals or none)),
-            torch.from_numpy(np.concatenate(truncated or [np.empty(0, np.float32)])),
-            torch.tensor(std),
-        )  # fmt: skip
-        self.seconds["rollouts"] += time.monotonic() - began
-        return rollout
+        noise = torch.randn((config.n_steps, self.count, 2), generator=self._draws)
+        parts = np.split(noise.numpy(), self.collectors.count, axis=1)
+        collected = self._collect_all(self.actor, self.share, std, each=parts)
+        return Rollout._make([*map(torch.from_numpy, collected), noise, torch.tensor(std)])
 
     def _train(self, rollout: Rollout) -> None:
         began, config = time.monotonic(), self.config
@@ -193,7 +197,8 @@ class PPO(Learner):
         config, alive = self.config, 1 - rollout.ended
         values = self.critic(rollout.states)[..., 0]
         after = values[1:] * alive
-        after[rollout.ended > 0] = self.critic(rollout.final)[:, 0] * rollout.truncated
+        ends = rollout.ended > 0
+        after[ends] = self.critic(rollout.final[ends])[:, 0] * rollout.truncated[ends]
         errors = rollout.rewards + config.gamma * after - values[:-1]
         advantages, ahead = torch.empty_like(errors), torch.zeros_like(errors[0])
         for tick in reversed(range(len(errors))):

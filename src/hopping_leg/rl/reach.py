@@ -128,13 +128,9 @@ def find_legs(
         on_progress: Told the share that is done, 0 to 1.
 
     Raises:
-        UsageError: The file is damaged, or there is nothing to do for a cluster.
+        UsageError: The file is damaged.
     """
     if recipe.legs == "robot":
-        if ray is not None:
-            raise UsageError(
-                f"--ray tries drawn legs, of which the recipe {recipe.name} has none; leave it out."
-            )
         return []
     assert isinstance(recipe.algorithm, DaggerConfig), "a teacher says what legs reach"
     count, heights = recipe.schedule.num_envs, recipe.task.command_bounds

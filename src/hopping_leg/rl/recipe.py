@@ -3,17 +3,20 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal, Self
 
 import numpy as np
 
 from hopping_leg import envs, io
-from hopping_leg.rl.dagger import Dagger, DaggerConfig
+from hopping_leg.errors import UsageError
+from hopping_leg.rl.dagger import Dagger, DaggerConfig, LabelCollector
 from hopping_leg.rl.learner import NetworkConfig
-from hopping_leg.rl.ppo import PPO, PPOConfig
+from hopping_leg.rl.ppo import PPO, PPOConfig, RolloutCollector
 from hopping_leg.rl.sac import ResumableSAC, SACConfig
 from hopping_leg.rl.students import StudentConfig
 from hopping_leg.robot import DEFAULT_ROBOT, Robot
+from hopping_leg.workers import WorkerGroup
 
 WEIGHT_MOMENT = 0.548
 """Moving mass times straight height of the leg that recipes are meant for, kg m: what hop torques
@@ -35,6 +38,9 @@ class Schedule:
     """Episodes (SAC) or rollouts (distillation) between two entries in the TensorBoard log."""
     checkpoint_seconds: float = 60.0
     """Time between checkpoints."""
+    workers: int = 1
+    """Equal parts of the environments with random numbers of their own, which collect rollouts in
+    turn or on a cluster."""
 
 
 @dataclass(frozen=True)
@@ -97,22 +103,56 @@ class Recipe:
         return {p.partition(".")[2] if p.startswith(_PARTS) else p: p for p in found}
 
     def make_learner(
-        self, robot: Robot, seed: int, threads: int = 1, legs: Sequence[envs.TaskLeg] = ()
+        self,
+        robot: Robot,
+        seed: int,
+        threads: int = 1,
+        legs: Sequence[envs.TaskLeg] = (),
+        ray: str | None = None,
     ) -> Dagger | PPO | ResumableSAC:
-        """Build the algorithm on its environments, of ``legs`` where these differ, untrained."""
-        rng, count, options = np.random.default_rng(seed), self.schedule.num_envs, self.task
+        """Build the algorithm on its environments, of ``legs`` where these differ, untrained.
+
+        Workers beyond the first are on the cluster of the address ``ray``, of a thread each.
+        """
+        self.check_workers(ray)
+        n, network, make = (
+            self.schedule.workers,
+            self.network,
+            partial(self._make_task, robot, seed),
+        )
+        tasks = [partial(make, k, legs[k::n], 1 if ray and k else threads) for k in range(n)]
+        group = [(task, self.algorithm, seed, k) for k, task in enumerate(tasks)]
+        if isinstance(self.algorithm, DaggerConfig):
+            assert isinstance(network, StudentConfig), "a distillation has a student"
+            return Dagger(WorkerGroup(LabelCollector, group, ray), self.algorithm, network, seed)
+        assert isinstance(network, NetworkConfig), "reinforcement learning has a critic"
+        if isinstance(self.algorithm, PPOConfig):
+            return PPO(WorkerGroup(RolloutCollector, group, ray), self.algorithm, network, seed)
+        return self.algorithm.make_learner(tasks[0](), network, seed)
+
+    def check_workers(self, ray: str | None) -> None:
+        """Raise ``UsageError`` for workers or a cluster that are of no use to the recipe."""
+        count, workers = self.schedule.num_envs, self.schedule.workers
+        if workers < 1 or count % workers:
+            raise UsageError(f"num_envs, {count}, must be a multiple of workers, {workers}.")
+        if isinstance(self.algorithm, SACConfig) and (ray or workers > 1):
+            raise UsageError("Soft actor-critic has one worker, here; leave workers and --ray out.")
+        if ray and workers == 1 and self.legs == "robot":
+            raise UsageError("--ray is for more than one worker; give e.g. --set workers=4.")
+
+    def _make_task(
+        self, robot: Robot, seed: int, number: int, legs: Sequence[envs.TaskLeg], threads: int
+    ) -> envs.HoppingTask:
+        """Build a worker's environments; those of worker 0 draw as those of a single one."""
+        count, options = self.schedule.num_envs // self.schedule.workers, self.task
+        rng = np.random.default_rng([seed, 0, number])
         if isinstance(self.algorithm, DaggerConfig):
             low, high = options.command_bounds
             beyond = (low, high + self.algorithm.headroom)
             options = dataclasses.replace(options, command_range=beyond)
-        task = envs.HoppingTask(
+        return envs.HoppingTask(
             robot, count, options, self.make_reward(robot), rng, threads, legs=legs
         )
-        if isinstance(self.algorithm, DaggerConfig):
-            assert isinstance(self.network, StudentConfig), "a distillation has a student"
-            return Dagger(task, self.algorithm, self.network, seed)
-        assert isinstance(self.network, NetworkConfig), "reinforcement learning has a critic"
-        return self.algorithm.make_learner(task, self.network, seed)
 
     def make_reward(self, robot: Robot) -> envs.Reward:
         """Build the reward."""

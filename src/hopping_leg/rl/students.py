@@ -33,7 +33,7 @@ class LabelledRollout(NamedTuple):
     begun: BoolArray
     """Whether an episode began with the tick, (ticks, n)."""
     memory: Array32
-    """What the student remembered before the first tick, (n, m)."""
+    """What the student remembered before the first tick, (1, n, m)."""
 
 
 class Batch(NamedTuple):
@@ -85,7 +85,7 @@ class RolloutBuffer:
         place = self.added % len(self._arrays["valid"])
         later = rollout.begun.copy()
         later[0] = False
-        memory = rollout.memory * ~rollout.begun[0][:, None]
+        memory = rollout.memory[0] * ~rollout.begun[0][:, None]
         new = rollout._asdict() | {"valid": ~np.logical_or.accumulate(later), "memory": memory}
         for name, array in self._arrays.items():
             array[place] = torch.from_numpy(new[name])

@@ -55,12 +55,13 @@ def train(
         minutes: Stop after so much wall-clock time, pauses excluded, or at the recipe's steps.
         threads: Threads of torch and physics; torch's is set for the whole process.
         quiet: Show no progress.
-        ray: Address of a Ray cluster that finds out what the teacher reaches on legs of any size;
-            without one, processes of this machine do, as many as ``threads``, at least two.
+        ray: Address of a Ray cluster that collects the rollouts of all workers but the first, and
+            finds out what the teacher reaches on legs of any size; without one, processes of this
+            machine do the latter, as many as ``threads``, at least two.
         command: What to call what made the policy, in its model card.
 
     Raises:
-        UsageError: ``out`` holds a run that cannot be continued so.
+        UsageError: ``out`` holds a run that cannot be continued so, or workers do not fit.
         RobotError: The robot has effects that training does not simulate.
     """
     if minutes is not None and not 0 < minutes < float("inf"):
@@ -71,6 +72,7 @@ def train(
             " and jitter, which training does not know; train on what is believed of it, the robot"
             " that its file extends or one from `hop identify`, and judge with `hop evaluate`."
         )
+    recipe.check_workers(ray)
     began = time.monotonic()
     torch.set_num_threads(max(threads, 1))
     title = f"{recipe.name} seed {seed}"
@@ -86,7 +88,7 @@ def train(
                 fitted, seed, out / "legs.json", max(threads, 2), ray,
                 lambda share: progress.show(title, share, about=", trying legs"),
             )  # fmt: skip
-            trainer = Trainer(recipe, robot, folder, legs, progress, threads, began)
+            trainer = Trainer(recipe, robot, folder, legs, progress, threads, began, ray)
             trainer.learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
             if tree is not None:
                 trainer.restore(tree)
@@ -94,7 +96,7 @@ def train(
 
 
 class Trainer:
-    """One training in one process."""
+    """One training."""
 
     def __init__(
         self,
@@ -105,11 +107,12 @@ class Trainer:
         progress: Progress,
         threads: int,
         began: float,
+        ray: str | None,
     ) -> None:
         self.recipe, self.robot, self.folder, self.legs = recipe, robot, folder, legs
         seed, minutes = folder.config["seed"], folder.config["minutes_budget"]
         self._seconds = math.inf if minutes is None else 60 * minutes
-        self.learner = recipe.make_learner(robot, seed, threads, legs)
+        self.learner = recipe.make_learner(robot, seed, threads, legs, ray)
         self.learner.on_boundary = self._at_boundary
         if minutes is not None:
             self.learner.remaining = lambda: max(0.0, 1 - self.elapsed / self._seconds)
