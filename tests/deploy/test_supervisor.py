@@ -208,14 +208,18 @@ def test_arming_waits_for_both_drives_but_not_for_ever():
 
 
 def test_damping_ends_at_rest_or_after_its_time_and_trusts_no_dead_encoder():
-    stop, dead, rest = Reason.OPERATOR_STOP, Reason.ENCODER_DEAD, Reason.CAME_TO_REST
-    for speed, why in (0.0, stop), (3.0, stop), (0.0, dead):
-        reason = rest if (speed, why) == (0.0, stop) else Reason.DAMPED_LONG_ENOUGH
+    stop, false, rest = Reason.OPERATOR_STOP, Reason.VELOCITY_FALSE, Reason.CAME_TO_REST
+    for speed, noise, why in (0, 1e-6, stop), (3, 1e-6, stop), (0, 0, stop), (0, 1e-6, false):
+        reason = rest if (speed, noise, why) == (0, 1e-6, stop) else Reason.DAMPED_LONG_ENOUGH
         memory, _ = supervise(LIMITS, running(), seen(2, operator=Operator.STOP))
         memory = replace(memory, stop_cause=replace(memory.stop_cause, reason=why))
         tick = 3
         while memory.state is State.DAMPING:
-            memory, _ = supervise(LIMITS, memory, at(tick, 1, velocity=speed, mode=15))
+            replies = [
+                replace(reply, position=reply.position + tick % 2 * noise, velocity=speed, mode=15)
+                for reply in seen(tick).replies
+            ]
+            memory, _ = supervise(LIMITS, memory, seen(tick, replies=tuple(replies)))
             tick += 1
         assert memory.cause.reason is reason
         assert memory.stop_cause.reason is why

@@ -30,7 +30,6 @@ class State(IntEnum):
 
 _NOTHING_YET = Cause(Reason.NONE)
 _NO_COUNTS = stop_reasons.Counts()
-_UNTRUE = (Reason.ENCODER_DEAD, Reason.VELOCITY_FALSE)  # After these no reply tells of rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +109,13 @@ def _calm_down(
     limits: SafetyLimits, before: SupervisorState, seen: SupervisorInput
 ) -> tuple[State, Cause]:
     elapsed = seen.time - before.since
-    resting = all(reply and abs(reply.velocity) <= limits.rest_speed for reply in seen.replies)
-    if resting and elapsed >= limits.damping_least and before.stop_cause.reason not in _UNTRUE:
+    pairs = zip(seen.replies, before.counts.last, strict=True)
+    # An encoder that gives the same to the last bit may be dead, whatever the leg was stopped for.
+    resting = before.stop_cause.reason is not Reason.VELOCITY_FALSE and all(
+        now and abs(now.velocity) <= limits.rest_speed and last and now.position != last.position
+        for now, last in pairs
+    )
+    if resting and elapsed >= limits.damping_least:
         return State.STOPPED, Cause(Reason.CAME_TO_REST)
     if not elapsed <= limits.damping_most:
         return State.STOPPED, Cause(Reason.DAMPED_LONG_ENOUGH)
