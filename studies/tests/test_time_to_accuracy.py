@@ -24,7 +24,8 @@ def hops(command, error, std=0.002, count=9, skipped=0):
 
 
 def row(recipe, seed, seconds, error, skipped=0):
-    numbers = {"mean_abs_median_error_m": error, "mean_std_m": error / 2, "skipped_hops": skipped}
+    numbers = {"mean_abs_median_error_m": error, "mean_offset_m": -error, "mean_std_m": error / 2}
+    numbers |= {"skipped_hops": skipped}
     return {"recipe": recipe, "seed": seed, "seconds": seconds, **numbers}
 
 
@@ -32,6 +33,7 @@ def test_errors_count_by_magnitude_and_a_height_without_hops_is_off_by_that_heig
     found = over_commands([hops(0.25, -0.004, skipped=2), hops(0.3, 0.002, std=0.006)])
     assert found["mean_abs_median_error_m"] == pytest.approx(0.003)
     assert found["worst_abs_median_error_m"] == pytest.approx(0.004)
+    assert found["mean_offset_m"] == pytest.approx(-0.001)
     assert found["mean_std_m"] == pytest.approx(0.004)
     assert (found["skipped_hops"], found["body_contact_ticks"]) == (2, 2)
     found = over_commands([hops(0.25, 0.001), hops(0.35, math.nan, math.nan, 0)])
@@ -56,17 +58,17 @@ def test_snapshots_of_stable_baselines3_come_at_equal_times_until_the_minutes_ar
     clock = itertools.count(5.0, 1 / 64)
     monkeypatch.setattr(sb3, "time", SimpleNamespace(monotonic=lambda: next(clock)))
     found = sb3.learn("sb3-ppo", ROBOT, 0, minutes=0.75 / 60, snapshots=3)
-    assert [snapshot.seconds for snapshot in found] == [0.25, 0.5, 0.75]
+    assert [seconds for seconds, _, _ in found] == [0.25, 0.5, 0.75]
     _, legs = sb3.ALGORITHMS["sb3-ppo"]
-    assert [snapshot.steps for snapshot in found] == [16 * legs, 32 * legs, 48 * legs]
-    for snapshot in found:
-        assert Policy(snapshot.content, "snapshot", "s").card.steps == snapshot.steps
+    assert [steps for _, steps, _ in found] == [16 * legs, 32 * legs, 48 * legs]
+    for _, steps, content in found:
+        assert Policy(content, "snapshot", "s").card.steps == steps
 
 
 @pytest.fixture
 def tiny(monkeypatch, tmp_path):
     """Return what makes a study of small recipes in a folder; ``trained`` are their trainings."""
-    monkeypatch.setattr(module, "RECIPES", {"fast": SHORT, "paper": TINY.replace(eval_every=400)})
+    monkeypatch.setattr(module, "TRAINED", {"fast": SHORT, "paper": TINY.replace(eval_every=400)})
     monkeypatch.setattr(module, "SHARES", {"fast": (0.5, 1.0)})
     try_briefly(monkeypatch)
     train = module.train

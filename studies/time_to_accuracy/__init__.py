@@ -2,16 +2,15 @@
 
 _RESULTS, _FIGURES = (f"studies/time_to_accuracy/{kind}" for kind in ("results", "figures"))
 
-RESULTS = (
-    *(
-        f"python -m studies.time_to_accuracy --recipes {recipes} --seeds {seeds} --json "
-        f"{_RESULTS}/{name}.json --figure {_FIGURES}/{name}.svg"
-        for name, recipes, seeds in (
-            ("rl", "rl", "0 1 2 3 4"),
-            ("distillation", "fast", "0 1 2 3 4"),
-            ("reinforcement_learning", "paper sb3-ppo sb3-sac", "1"),
-        )
-    ),
-    f"python -m studies.time_to_accuracy --recipes universal --seeds 0 1 2 --json "
-    f"{_RESULTS}/universal.json",
+RESULTS = tuple(
+    f"python -m studies.time_to_accuracy --recipes {recipes} --seeds {seeds} --json "
+    f"{_RESULTS}/{name}.json --figure {_FIGURES}/{name}.svg"
+    for name, recipes, seeds in (
+        ("rl", "rl", "0 1 2 3 4"),
+        ("distillation", "fast", "0 1 2 3 4"),
+        ("paper", "paper", "0 1 2 3 4"),
+        ("paper_ppo", "paper-ppo paper-ppo-no-soft-limits", "0 1"),
+        ("stable_baselines3", "sb3-ppo sb3-sac", "1"),
+        ("universal", "universal", "0 1 2"),
+    )
 )

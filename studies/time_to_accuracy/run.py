@@ -10,6 +10,7 @@ were trained for.
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -30,6 +31,14 @@ from studies.time_to_accuracy import sb3
 JUDGING_SEEDS = (1000, 1001)
 """Seeds of noise and delay that chose nothing."""
 
+_PPO, _PAPER = RECIPES["rl"], RECIPES["paper"].replace(actor=(128, 128), eval_every=10**9)
+TRAINED = {
+    "paper-ppo": _PAPER.replace(algorithm=_PPO.algorithm, schedule=_PPO.schedule),
+    **RECIPES,
+}
+TRAINED["paper-ppo-no-soft-limits"] = TRAINED["paper-ppo"].replace({"task.soft_limits": None})
+"""Recipes, and another learner on the paper's reward: what that can reach."""
+
 SHARES = {"fast": (0.25, 0.5, 1.0)}
 """Shares of the recipe's steps, for recipes whose schedules end with them."""
 
@@ -41,7 +50,7 @@ class TimeToAccuracy:
     """Train recipes and stable-baselines3's algorithms from scratch; judge them over time."""
 
     recipes: tuple[str, ...] = ("rl", "fast", "paper", *sb3.ALGORITHMS)
-    """Recipes, sb3-ppo and sb3-sac."""
+    """Recipes, paper-ppo, paper-ppo-no-soft-limits, sb3-ppo and sb3-sac."""
     seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
     """One training each."""
     robot: str | None = None
@@ -60,7 +69,7 @@ class TimeToAccuracy:
         spent: list[Row] = []
         for recipe in self.recipes:
             asked = {"robot": self._robot(recipe).digest, "minutes": self.minutes}
-            asked |= {"options": repr(RECIPES.get(recipe)), "shares": SHARES.get(recipe)}
+            asked |= {"options": repr(TRAINED.get(recipe)), "shares": SHARES.get(recipe)}
             for seed in self.seeds:
                 file = self.out / "judged" / f"{recipe}-{seed}.json"
                 found = once(file, asked, self._train, recipe, seed)
@@ -85,11 +94,9 @@ class TimeToAccuracy:
         robot = self._robot(recipe)
         if recipe in sb3.ALGORITHMS:
             found = sb3.learn(recipe, robot, seed, self.minutes, snapshots=12)
-            rows = [
-                {"seconds": s.seconds, "steps": s.steps, **judge(s.content, robot)} for s in found
-            ]
+            rows = [{"seconds": s, "steps": n, **judge(content, robot)} for s, n, content in found]
             return {"rows": rows, "spent": {}}
-        rows, result, whole = [], {}, RECIPES[recipe]
+        rows, result, whole = [], {}, TRAINED[recipe]
         for share in SHARES.get(recipe, (1.0,)):
             folder = self.out / f"{recipe}-{seed}" / f"{share:g}"
             if not (folder / "policy.onnx").exists():
@@ -103,16 +110,16 @@ class TimeToAccuracy:
                 times = {row["steps"]: 60 * row["minutes"] for row in result["history"]}
                 policies = [(times[int(f.stem)], int(f.stem), f) for f in sorted(snapshots)]
             for seconds, steps, file in policies:
-                judged = judge(file.read_bytes(), robot)
+                judged = judge(file.read_bytes(), robot, soft_limits=whole.task.soft_limits)
                 rows.append({"seconds": seconds, "steps": steps, **judged})
         return {"rows": rows, "spent": result["seconds"]}
 
     def _robot(self, recipe: str) -> Robot:
-        usual = RECIPES[recipe].robot if recipe in RECIPES else DEFAULT_ROBOT
+        usual = TRAINED[recipe].robot if recipe in TRAINED else DEFAULT_ROBOT
         return load_robot(self.robot or usual)
 
 
-def judge(content: bytes, robot: Robot) -> Row:
+def judge(content: bytes, robot: Robot, **world: Any) -> Row:  # noqa: ANN401
     """Return the accuracy of a policy file every 2 cm of its range, or at the paper's heights."""
     policy = Policy(content, "policy", "policy")
     policy.set_robot(robot)
@@ -120,7 +127,8 @@ def judge(content: bytes, robot: Robot) -> Row:
     heights = tuple(np.arange(low, high + 1e-6, _SPACING).round(3).tolist())
     if (low, high) == (0.25, 0.35):
         heights = (0.25, 0.30, 0.35)
-    return over_commands(evaluate_policy(policy, robot, heights, JUDGING_SEEDS))
+    tried = evaluate_policy(policy, robot, heights, JUDGING_SEEDS, **world)
+    return over_commands(tried)
 
 
 def over_commands(results: list[CommandResult]) -> Row:
@@ -130,6 +138,7 @@ def over_commands(results: list[CommandResult]) -> Row:
         "commands": len(results),
         "mean_abs_median_error_m": float(np.mean(errors)),
         "worst_abs_median_error_m": float(np.max(errors)),
+        "mean_offset_m": float(np.mean([r.median_error_m for r in results if r.hops] or [0.0])),
         "mean_std_m": float(np.mean([r.std_m for r in results if r.hops] or [0.0])),
         "skipped_hops": sum(r.skipped_hops for r in results),
         "body_contact_ticks": sum(r.body_contact_ticks for r in results),
@@ -153,6 +162,7 @@ def summarise(rows: list[Row]) -> list[Row]:
             "runs": len(there),
             "mean_error_m": float(np.mean(errors)),
             "worst_seed_mean_error_m": float(np.max(errors)),
+            "mean_offset_m": float(np.mean([row["mean_offset_m"] for row in there])),
             "mean_std_m": float(np.mean([row["mean_std_m"] for row in there])),
             "skipped_hops": sum(row["skipped_hops"] for row in there),
         })  # fmt: skip

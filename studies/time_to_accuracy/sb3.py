@@ -2,7 +2,6 @@
 
 import tempfile
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import torch
@@ -17,13 +16,8 @@ ALGORITHMS = {"sb3-ppo": (PPO, 8), "sb3-sac": (SAC, 1)}
 """Algorithm and number of environments by name."""
 
 
-@dataclass(frozen=True)
-class Snapshot:
-    """A policy as it stood."""
-
-    seconds: float
-    steps: int
-    content: bytes
+Snapshot = tuple[float, int, bytes]
+"""Seconds, control steps and the policy file as it stood."""
 
 
 def learn(name: str, robot: Robot, seed: int, minutes: float, snapshots: int) -> list[Snapshot]:
@@ -51,5 +45,5 @@ class _Keep(BaseCallback):  # type: ignore[misc]
         if passed >= self._every * (len(self.snapshots) + 1):
             with tempfile.TemporaryDirectory() as folder:
                 content = export_policy(self.model, Path(folder) / "policy.onnx").content
-            self.snapshots.append(Snapshot(passed, int(self.num_timesteps), content))
+            self.snapshots.append((passed, int(self.num_timesteps), content))
         return passed < self._last

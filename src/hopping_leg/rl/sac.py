@@ -96,25 +96,24 @@ class TaskVecEnv(Stateful, VecEnv):  # type: ignore[misc]
 
 @dataclass(frozen=True)
 class SACConfig:
-    """Soft actor-critic with generalised state-dependent exploration (gSDE).
+    """Soft actor-critic with gSDE; names, and what is not named, are as in stable-baselines3."""
 
-    Names, and what is not named, are as in stable-baselines3.
-    """
-
-    learning_rate: float = 5e-4
+    learning_rate: float = 1e-3
     """Learning rate of all networks at the start; falls linearly to a tenth."""
     buffer_size: int = 300_000
     """Transitions in the replay buffer."""
     learning_starts: int = 2_000
     """Steps of uniformly random torque before the first gradient step."""
-    batch_size: int = 256
+    batch_size: int = 1024
     """Transitions per gradient step."""
+    n_steps: int = 8
+    """Control steps whose rewards count before a critic's value of what follows."""
     gamma: float = 0.99
     """Discount factor per control step: a horizon of half a second, about one hop."""
     train_freq: int = 32
     """Control steps between updates, each environment; gSDE keeps its noise as long, 0.16 s."""
     gradient_steps: int = 128
-    """Gradient steps after each rollout: one for every 4 steps of experience."""
+    """Gradient steps after each rollout."""
     log_std: float = -2.0
     """Initial log standard deviation of gSDE's weights."""
 
@@ -237,13 +236,12 @@ class ResumableSAC(Stateful, SAC):  # type: ignore[misc]
     def state(self) -> Tree:
         """Return everything needed to continue exactly, its environment included."""
         buffer = self.replay_buffer
-        filled = buffer.buffer_size if buffer.full else buffer.pos
         return {
             **super().state(),
             "torch": torch.get_rng_state(),
             "numpy": np.random.get_state(legacy=True),  # noqa: NPY002
             "place": [buffer.pos, buffer.full],
-            "replay": {name: getattr(buffer, name)[:filled] for name in _REPLAY},
+            "replay": {name: getattr(buffer, name)[: buffer.size()] for name in _REPLAY},
         }
 
     def restore(self, state: Tree) -> None:

@@ -17,8 +17,8 @@ PAPER = recipe.Recipe(
     ),
     reward=PaperRewardConfig(),
     algorithm=sac.SACConfig(),
-    network=learner.NetworkConfig(actor=(256, 256, 128, 128), critic=(256, 256, 128, 128)),
-    schedule=recipe.Schedule(num_envs=16, steps=240_000, log_every=32),
-    selection=recipe.SelectionConfig(eval_every=8_000),
+    network=learner.NetworkConfig(actor=(256, 256, 128, 128), critic=(128, 128)),
+    schedule=recipe.Schedule(num_envs=64, steps=240_000, log_every=128),
+    selection=recipe.SelectionConfig(eval_every=16_000),
     robot="legv2-paper",
 )
