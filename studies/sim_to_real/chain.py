@@ -103,7 +103,7 @@ class Chain:
 
     def identify(self) -> list[Row]:
         """Record the twins and identify them, if a method asks for it; return the fits."""
-        kinds = {_fit_name(method): method for method in self.methods if method.fit}
+        kinds = {method.fit: method for method in self.methods if method.fit}
         if not kinds:
             return []
         seconds = self.asked.seconds
@@ -128,10 +128,10 @@ class Chain:
                 "believed": load_robot(twin.believed).digest,
                 "recordings": [digests[key] for key in pair],
                 **({"belt": PLAY} if method.belt else {}),
-                **({"search": method.fit} if method.fit != "least-squares" else {}),
+                **({"search": method.search} if method.search != "least-squares" else {}),
             }
             file, recordings = self._fit(twin, method), [files[key] for key in pair]
-            fit = twin, recordings, file, method.fit, method.belt
+            fit = twin, recordings, file, method.search, method.belt
             jobs.append((file.with_suffix(".json"), asked, steps.fit, *fit))
         return do_all(jobs, self.asked.jobs)
 
@@ -202,14 +202,7 @@ class Chain:
         ]
 
     def _fit(self, twin: Twin, method: Method) -> Path:
-        return self._file("robots", f"{twin.name}-{_fit_name(method)}.toml")
+        return self._file("robots", f"{twin.name}-{method.fit}.toml")
 
     def _file(self, kind: str, name: str) -> Path:
         return self.asked.folder / kind / name
-
-
-def _fit_name(method: Method) -> str:
-    """Return what distinguishes the fits of a twin."""
-    if method.fit != "least-squares":
-        return method.fit
-    return "identified-belt" if method.belt else "identified"

@@ -15,8 +15,8 @@ class Method:
     Attributes:
         name: On the command line and in the results.
         meaning: A phrase for tables.
-        fit: Search that identifies the twin from recordings, as in `hop identify`; empty where the
-            robot is not the identified twin.
+        fit: Name of the fit to recordings of the twin whose result is simulated; empty for none.
+        search: Search of that fit, as in `hop identify`.
         belt: Whether the fit and training know a belt, with assumed backlash and jitter.
         robot: Robot that is trained on without a fit; None takes the one that the twin extends.
         ranges: What every leg in training draws for itself, around the robot.
@@ -30,6 +30,7 @@ class Method:
     name: str
     meaning: str
     fit: str = ""
+    search: str = "least-squares"
     belt: bool = False
     robot: str | None = None
     ranges: Randomise = "none"
@@ -41,9 +42,9 @@ class Method:
 METHODS = {
     method.name: method
     for method in (
-        Method("identified", "identified from both recordings", fit="least-squares"),
-        Method("identified-belt", "identified, with the knee's belt", "least-squares", belt=True),
-        Method("two-pass", "the paper's two passes of CMA-ES", fit="two-pass"),
+        Method("identified", "identified from both recordings", fit="identified"),
+        Method("identified-belt", "identified, with the knee's belt", "identified-belt", belt=True),
+        Method("two-pass", "the paper's two passes of CMA-ES", "two-pass", "two-pass"),
         Method("cad", "CAD defaults"),
         Method("table-1", "the paper's Table I", robot="legv2-paper"),
         Method("randomised", "domain randomisation over the twins' ranges", ranges="twins"),
@@ -57,7 +58,7 @@ METHODS = {
         Method(
             "energy-shaping-identified",
             "energy shaping, tuned on what is identified with the belt",
-            fit="least-squares",
+            fit="identified-belt",
             belt=True,
             untrained=ENERGY_SHAPING,
             tuned=True,
@@ -66,7 +67,7 @@ METHODS = {
         Method(
             "universal-identified",
             "`universal`, told what both recordings identify",
-            fit="least-squares",
+            fit="identified",
             untrained="universal",
         ),
     )

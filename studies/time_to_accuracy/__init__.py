@@ -1,16 +1,18 @@
 """How long does it take from scratch to accurate hopping?"""
 
-_RESULTS, _FIGURES = (f"studies/time_to_accuracy/{kind}" for kind in ("results", "figures"))
-
-RESULTS = tuple(
-    f"python -m studies.time_to_accuracy --recipes {recipes} --seeds {seeds} --json "
-    f"{_RESULTS}/{name}.json --figure {_FIGURES}/{name}.svg"
-    for name, recipes, seeds in (
-        ("rl", "rl", "0 1 2 3 4"),
-        ("distillation", "fast", "0 1 2 3 4"),
-        ("paper", "paper", "0 1 2 3 4"),
-        ("paper_ppo", "paper-ppo paper-ppo-no-soft-limits", "0 1"),
-        ("stable_baselines3", "sb3-ppo sb3-sac", "1"),
-        ("universal", "universal", "0 1 2"),
-    )
+RESULTS = (
+    *(
+        f"python -m studies.time_to_accuracy --recipes {recipes} --seeds {seeds} --json "
+        f"studies/time_to_accuracy/results/{name}.json"
+        for name, recipes, seeds in (
+            ("rl", "rl", "0 1 2 3 4"),
+            ("distillation", "fast", "0 1 2 3 4"),
+            ("paper", "paper", "0 1 2 3 4"),
+            ("paper_ppo", "paper-ppo paper-ppo-no-soft-limits", "0 1"),
+            ("stable_baselines3", "sb3-ppo sb3-sac", "1"),
+            ("universal", "universal", "0 1 2"),
+        )
+    ),
+    "python -m studies.time_to_accuracy --recipes --figure "
+    "studies/time_to_accuracy/figures/time_to_accuracy.svg",
 )

@@ -7,6 +7,7 @@ them. All policies are judged on seeds that chose nothing, at the heights and on
 were trained for.
 """
 
+import json
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -25,7 +26,7 @@ from hopping_leg.rl.recipes import RECIPES
 from hopping_leg.rl.run_folder import read_result
 from hopping_leg.rl.train import train
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
-from studies.shared import Row, once, show_rows
+from studies.shared import ROOT, Row, once, show_rows
 from studies.time_to_accuracy import sb3
 
 JUDGING_SEEDS = (1000, 1001)
@@ -60,7 +61,7 @@ class TimeToAccuracy:
     out: Path = Path("runs/time_to_accuracy")
     """Where the trainings are kept: finished ones are not repeated, killed ones go on."""
     figure: Path | None = None
-    """Draw the curves to this .svg file."""
+    """Draw the curves to this .svg file, beside those of all stored results."""
     json: JsonFile = None
 
     def measure(self) -> Row:
@@ -79,7 +80,9 @@ class TimeToAccuracy:
         lengths = ("mean_error_m", "worst_seed_mean_error_m", "mean_std_m")
         show_rows(summary, "recipe", "seconds", *lengths, "skipped_hops")
         if self.figure is not None:
-            write_atomically(self.figure, encode(draw(rows), "svg"))
+            stored = sorted(ROOT.glob("studies/time_to_accuracy/results/*.json"))
+            drawn = [row for file in stored for row in json.loads(file.read_text())["rows"]]
+            write_atomically(self.figure, encode(draw(rows + drawn), "svg"))
         return {
             "robots": {name: self._robot(name).name for name in self.recipes},
             "rows": rows,
@@ -195,10 +198,10 @@ def draw(rows: list[Row]) -> Figure:
                 seconds = [row["seconds"] for row in line]
                 shown = [1e3 * row[key] or np.nan for row in line]
                 axis.plot(seconds, shown, ".-", color=colour, lw=0.8, label=label)
-        axis.set(xscale="log", yscale="log")
+        axis.set(xscale="log", yscale="log", ylim=(0.2, 500))
         for side in (axis.xaxis, axis.yaxis):
             side.set_major_formatter("{x:g}")
         axis.set_ylabel(title)
-    axes[0][0].legend(ncol=len(colours))
+    axes[0][0].legend(ncol=2)
     axes[-1][0].set_xlabel("wall-clock time / s")
     return figure
