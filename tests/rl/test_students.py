@@ -91,7 +91,7 @@ def tagged(number, begun=()):
     starts = np.zeros((TICKS, LEGS), bool)
     for place in begun:
         starts[place] = True
-    memory = np.arange(LEGS, dtype=np.float32)[:, None] + 1
+    memory = np.arange(LEGS, dtype=np.float32)[None, :, None] + 1
     return LabelledRollout(seen, seen.copy(), seen[..., 1] + 1, seen[..., :1], starts, memory)
 
 
