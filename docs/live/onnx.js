@@ -112,16 +112,14 @@ export function runOnnx({ nodes, weights, outputs }, inputs) {
   return Object.fromEntries(outputs.map((name) => [name, values.get(name)]));
 }
 
-// An operator on every pair of values, of which one side may be a single one.
+// An operator on every pair of values; one side may be a single one, or the first a column.
 const paired = (apply) => (a, b) => {
-  if (a.length !== b.length && a.length !== 1 && b.length !== 1) {
+  if (!a.column && a.length !== b.length && a.length !== 1 && b.length !== 1) {
     throw new PageError("It has tensors of more axes than this page evaluates.");
   }
-  const result = new Float32Array(Math.max(a.length, b.length));
-  for (let i = 0; i < result.length; i++) {
-    result[i] = apply(a[a.length === 1 ? 0 : i], b[b.length === 1 ? 0 : i]);
-  }
-  return [result];
+  const result = new Float32Array(a.column ? a.length * b.length : Math.max(a.length, b.length));
+  const row = (i) => (a.column ? Math.floor(i / b.length) : i % a.length);
+  return [result.map((_, i) => apply(a[row(i)], b[i % b.length]))];
 };
 
 // Parts of the last axis; sizes are integers.
@@ -134,8 +132,11 @@ const each = (apply) => (a) => [a.map(apply)];
 const same = (a) => [a];
 const sigmoid = (x) => 1 / (1 + Math.exp(-x));
 
-// x W + b for W (in, out), or (out, in) if it is transposed, summed in double precision.
+// x W + b for W (in, out), or (out, in) if transposed, in doubles; of rows, where W is a column.
 function gemm(x, weight, bias, transposed) {
+  const rows = x.length / weight.length;
+  const parts = () => split(x, Array(rows).fill(weight.length));
+  if (rows > 1) return [Float32Array.from(parts(), (part) => gemm(part, weight)[0][0])];
   const count = weight.length / x.length;
   const [row, column] = transposed ? [1, x.length] : [count, 1];
   const sums = bias ? Float64Array.from(bias) : new Float64Array(count);
@@ -174,7 +175,7 @@ const OPERATORS = {
   Elu: each((x) => (x > 0 ? x : Math.expm1(x))),
   Flatten: same,
   GRU: gru,
-  Gather: (a, places) => [Float32Array.from(places, (place) => a[place])],
+  Gather(a, places) { return [this.axis > 1 ? a : Float32Array.from(places, (at) => a[at])]; },
   Gemm(x, weight, bias) { return gemm(x, weight, bias, this.transB); },
   MatMul: (x, weight) => gemm(x, weight),
   Mul: paired((a, b) => a * b),
@@ -183,5 +184,5 @@ const OPERATORS = {
   Squeeze: same,
   Sub: paired((a, b) => a - b),
   Tanh: each(Math.tanh),
-  Unsqueeze: same,
+  Unsqueeze: (a) => [Object.assign(a.slice(), { column: true })],
 };
