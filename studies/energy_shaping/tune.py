@@ -29,7 +29,7 @@ from hopping_leg.controllers.energy_shaping.gains import (
     scale_gains,
 )
 from hopping_leg.io import write_atomically
-from hopping_leg.robot import DEFAULT_ROBOT, NO_MISMATCH, Robot, load_robot
+from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
 from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.randomization import draw_twin
 from studies.shared import Row, main, once, show_rows
@@ -82,7 +82,7 @@ ON_TWINS = SPACE | {
     "flight_min": (0.06, 0.22),
     "position_pull": (0.02, 0.4),
 }
-"""Ranges where [reality] is told: belts and drives want more damping."""
+"""Ranges on twins, whose belts and drives want more damping."""
 
 Space = dict[str, tuple[float, float]]
 
@@ -145,6 +145,8 @@ class Tune:
     """Heights that a candidate is tried at, m: those that the leg's motors reach."""
     twins: int = 0
     """How many twins of the robot to draw and try every candidate on instead of the robot."""
+    damped: bool = False
+    """Search the ranges of twins also without any."""
     seed: int = 0
     """Seed of the search, and of the first twin; noise and delay take seeds 0 to 9."""
     threads: int = 0
@@ -204,8 +206,7 @@ class Tune:
         normal = np.random.default_rng(self.seed).standard_normal
         settings = {"popsize": self.population, "bounds": [0.0, 1.0], "seed": np.nan, "verbose": -9}
         settings["randn"] = lambda *shape: normal(shape)
-        ideal = all(leg.reality == NO_MISMATCH for leg in self.legs)
-        space = SPACE if ideal else ON_TWINS
+        space = ON_TWINS if self.twins or self.damped else SPACE
         strategy = cma.CMAEvolutionStrategy(to_unit(start, space), self.step, settings)
         for generation in range(self.generations):
             points = strategy.ask()

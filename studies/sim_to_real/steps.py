@@ -116,7 +116,7 @@ def learn(recipe: Recipe, robot: Robot, seed: int, folder: Path) -> Row:
     }
 
 
-TUNE = Tune(start=ENERGY_SHAPING_TUNED, threads=1)
+TUNE = Tune(start=ENERGY_SHAPING_TUNED, damped=True, threads=1)
 
 
 def tune(source: str, folder: Path) -> Row:

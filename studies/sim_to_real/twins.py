@@ -81,7 +81,7 @@ def find_twins(words: Sequence[str], folder: Path) -> tuple[Twin, ...]:
     return found
 
 
-BELT = (resources.files("hopping_leg.cli") / "with_belt.toml").read_text(encoding="utf-8")
+BELT = (resources.files("hopping_leg.identify") / "with_belt.toml").read_text(encoding="utf-8")
 """A robot file that extends another one by what is assumed of its knee's belt."""
 
 _KNEE = tomllib.loads(BELT.format("legv2"))["reality"]["knee"]

@@ -153,8 +153,8 @@ def _identify(recordings: "list[Recording]", believed: str, folder: Path, *, qui
     if file.exists():
         return str(file)
     origin = folder / "with-belt.toml"
-    belt = Path(__file__).with_name("with_belt.toml").read_text(encoding="utf-8")
-    io.write_atomically(origin, belt.format(believed).encode())
+    belt = Path(__file__).parents[1] / "identify" / "with_belt.toml"
+    io.write_atomically(origin, belt.read_text(encoding="utf-8").format(believed).encode())
     start = load_robot(str(origin))
     links = {"thigh.inertia": start.thigh.inertia, "shank.inertia": start.shank.inertia}
     bounds = {name: (v / _INERTIA_FACTOR, v * _INERTIA_FACTOR) for name, v in links.items()}

@@ -64,9 +64,9 @@ def _stored(node: Any) -> Any:  # noqa: ANN401
         return [_stored(value) for value in node]
     if isinstance(node, np.generic):
         return node.item()
-    return (
-        (torch.from_numpy(np.require(node, None, "W")),) if isinstance(node, np.ndarray) else node
-    )
+    if isinstance(node, np.ndarray):  # read-only where it comes from a cluster
+        return (torch.from_numpy(np.require(node, None, "W")),)
+    return node
 
 
 def _as_it_was(node: Any) -> Any:  # noqa: ANN401

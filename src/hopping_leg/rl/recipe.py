@@ -115,11 +115,8 @@ class Recipe:
         Workers beyond the first are on the cluster of the address ``ray``, of a thread each.
         """
         self.check_workers(ray)
-        n, network, make = (
-            self.schedule.workers,
-            self.network,
-            partial(self._make_task, robot, seed),
-        )
+        n, network = self.schedule.workers, self.network
+        make = partial(self._make_task, robot, seed)
         tasks = [partial(make, k, legs[k::n], 1 if ray and k else threads) for k in range(n)]
         group = [(task, self.algorithm, seed, k) for k, task in enumerate(tasks)]
         if isinstance(self.algorithm, DaggerConfig):
