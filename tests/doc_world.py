@@ -28,9 +28,7 @@ SHORTER = {
     "hop identify": "--parameters hip.friction,knee.friction",
     "hop record play --transport": "--yes",
     "hop train": "--steps 1 --heights 0.28 0.32",
-    "hop train --recipe universal": (
-        "--steps 1 --heights 0.28 0.32 --set num_envs=64 batch_size=1024"
-    ),
+    "hop train --recipe universal": "--steps 1 --heights .3 .32 --set num_envs=64 batch_size=1024",
     "hop view": "--no-browser --port 0 --seconds 0.5",
 }
 """Options added to every command with these words; of several entries the one with the most words

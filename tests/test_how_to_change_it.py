@@ -27,11 +27,9 @@ SHORT = {
 """What makes a verb's command short."""
 
 SAYS = {
-    "A fault": "slow_warming",
-    "A robot": "my-robot",
-    "A robustness axis": "joint-damping",
+    "A fault": "slow_warming", "A robot": "my-robot", "A robustness axis": "joint-damping",
     "A recipe": "long",
-}
+}  # fmt: skip
 """What the commands of a change print, where that shows it."""
 
 

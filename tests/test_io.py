@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from hopping_leg import io
+from hopping_leg import io, trace
 from hopping_leg.errors import RobotError, TraceError, UsageError
 from hopping_leg.io import write_atomically
 from hopping_leg.trace import COLUMNS, Trace
@@ -82,12 +82,12 @@ def some_trace():
 
 
 def test_a_trace_survives_its_file_and_saved_again_has_the_same_bytes(tmp_path):
-    trace = some_trace()
+    saved = some_trace()
     path = tmp_path / "deeper" / "run.parquet"
-    trace.save(path)
+    saved.save(path)
     back = Trace.load(path)
-    assert back.header == trace.header
-    assert back.table.equals(trace.table)
+    assert back.header == saved.header
+    assert back.table.equals(saved.table)
     with pytest.raises(TraceError, match=r"no column 'speed'.*height_m"):
         back.column("speed")
     some_trace().save(tmp_path / "again.parquet")
@@ -110,6 +110,17 @@ def test_missing_foreign_and_cut_files_are_refused_in_a_sentence(tmp_path):
         path.write_bytes(whole[:end])
         with pytest.raises(TraceError, match=r"not a readable Parquet file: [^\n]+\.$"):
             Trace.load(path)
+
+
+def test_a_file_that_would_end_the_process_is_refused(tmp_path, monkeypatch):
+    path = tmp_path / "run.parquet"
+    some_trace().save(path)
+    monkeypatch.setattr(trace, "_READER", "import os; os.abort()")
+    trace._reader.cache_clear()
+    with pytest.raises(TraceError, match="not a readable Parquet file: it is damaged, or of"):
+        Trace.load(path)
+    monkeypatch.undo()
+    assert Trace.load(path).table.height == 7
 
 
 def test_a_write_that_is_interrupted_or_fails_leaves_the_old_file_and_nothing_else(

@@ -17,20 +17,13 @@ P = ParamSpec("P")
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Okabe and Ito's palette, distinct for all common kinds of colour blindness."""
 
-COMMAND = "#737373"
-"""Of commanded heights."""
+COMMAND = "#737373"  # Of commanded heights
 
 _OF_CONTROLLERS = {
-    "rl": "#0072B2",
-    "energy-shaping": "#D55E00",
-    "fast": "#009E73",
-    "universal": "#CC79A7",
-    "energy-shaping-tuned": "#56B4E9",
-    "energy-shaping-flying": "#E69F00",
-    "energy-shaping-literal": "#8C510A",
-    "mpc-true-state": "#8A7A00",
-    "paper": "#7A5AA6",
-}
+    "rl": "#0072B2", "energy-shaping": "#D55E00", "fast": "#009E73", "universal": "#CC79A7",
+    "energy-shaping-tuned": "#56B4E9", "energy-shaping-flying": "#E69F00",
+    "energy-shaping-literal": "#8C510A", "mpc-true-state": "#8A7A00", "paper": "#7A5AA6",
+}  # fmt: skip
 """Of the shipped ones, whatever stands beside them."""
 
 
@@ -54,19 +47,11 @@ TORQUE_MAP = "PuOr_r"  # Diverging and colour-blind safe; white is no torque
 WIDTH = 8.0  # Width of a figure, inches
 
 _LOOK = {
-    "font.size": 9,
-    "axes.titlesize": 10,
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "0.92",
-    "grid.linewidth": 0.8,
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "legend.fontsize": 8,
+    "font.size": 9, "axes.titlesize": 10, "axes.titlelocation": "left", "axes.spines.top": False,
+    "axes.spines.right": False, "axes.grid": True, "grid.color": "0.92", "grid.linewidth": 0.8,
+    "axes.axisbelow": True, "legend.frameon": False, "legend.fontsize": 8,
     "svg.hashsalt": "hopping-leg",
-}
+}  # fmt: skip
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:

@@ -14,17 +14,10 @@ from hopping_leg.trace import Trace
 COLUMNS = ("height_m", "height_rate_m_s", "foot_clearance_m")
 """Columns of a trace that hops are found in, in the order of ``find_hops``."""
 
-FLIGHT_CLEARANCE = 0.003
-"""Foot clearance that counts as flight, m."""
-
-BOUNCE = 0.01
-"""Rise and fall of the base that counts as a bounce when the foot stays on the ground, m."""
-
-SKIP_RATIO = 1.6
-"""A gap between apexes longer than this many median periods holds a skipped hop."""
-
-USUAL_PERIOD = 0.5
-"""Period assumed where a run has less than three hops, s."""
+FLIGHT_CLEARANCE = 0.003  # Foot clearance that counts as flight, m
+BOUNCE = 0.01  # Rise and fall of a base whose foot stays on the ground that counts as a bounce, m
+SKIP_RATIO = 1.6  # A gap between apexes of more median periods holds a skipped hop
+USUAL_PERIOD = 0.5  # Period assumed where a run has less than three hops, s
 
 
 @dataclass(frozen=True)

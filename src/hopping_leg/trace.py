@@ -3,9 +3,14 @@
 Stored as Parquet with the header in the file's metadata; nothing is ever unpickled.
 """
 
+import atexit
+import contextlib
 import io
 import json
+import subprocess
+import sys
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +21,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.errors import Error, TraceError
 from hopping_leg.io import parse_json, write_atomically
 
-SCHEMA = 1
-"""Version of the layout, stored in every header."""
+SCHEMA = 1  # Version of the layout, stored in every header
 
 COLUMNS = {
     "time_s": "start of the control period",
@@ -45,14 +49,36 @@ def interpolated(name: str) -> pl.Expr:
     return pl.when(known.forward_fill(10).is_not_null()).then(known.interpolate())
 
 
+_READER = """import io, polars, sys
+while size := int(sys.stdin.buffer.readline() or 0):
+    polars.read_parquet(io.BytesIO(sys.stdin.buffer.read(size)))
+    print(flush=True)
+"""
+
+
+@cache
+def _reader() -> subprocess.Popen[bytes]:
+    words, pipe = [sys.executable, "-P", "-c", _READER], subprocess.PIPE
+    reader = subprocess.Popen(words, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL)
+    atexit.register(reader.communicate)
+    return reader
+
+
 def read_parquet(content: bytes, origin: str, error: Error) -> tuple[pl.DataFrame, dict[str, str]]:
-    """Return a Parquet file's table and metadata; ``error`` says what polars finds wrong."""
-    try:
-        metadata = pl.read_parquet_metadata(io.BytesIO(content))
-        return pl.read_parquet(io.BytesIO(content)), metadata
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as problem:
-        said = str(problem).partition("\n")[0].rstrip(".") or "it is damaged"
-        raise error(f"{origin} is not a readable Parquet file: {said}.") from problem
+    """Return a Parquet file's table and metadata; ``error`` says that it is damaged.
+
+    It is read elsewhere first: a damaged one may end the process that reads it.
+    """
+    reader = _reader()
+    with contextlib.suppress(pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError):
+        if reader.stdin and reader.stdout:
+            reader.stdin.write(b"%d\n%b" % (len(content), content))
+            reader.stdin.flush()
+            if reader.stdout.readline():
+                metadata = pl.read_parquet_metadata(io.BytesIO(content))
+                return pl.read_parquet(io.BytesIO(content)), metadata
+    _reader.cache_clear()
+    raise error(f"{origin} is not a readable Parquet file: it is damaged, or of another kind.")
 
 
 @dataclass(frozen=True)

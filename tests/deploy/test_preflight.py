@@ -38,7 +38,7 @@ def complaints(knee, robot=LEG):
         ({"voltage": math.nan}, "nan V but must lie"),
         ({"temperature": 70.0}, "has 70 deg C"),
         ({"home": 1}, "is not homed"),
-        ({"position": 0.4}, "stands at 0.40 rad"),
+        ({"position": 0.4}, "stands at 0.400 rad"),
         ({"position": math.nan}, "stands at nan rad"),
         ({"settings": {}}, "is nan but must be"),
     ],

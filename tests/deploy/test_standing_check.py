@@ -89,8 +89,7 @@ def share_that_may_hop(robot, wiring, *, truth=None, seed=0):
 
 BELT = 2.0
 WRONG = {
-    "hip reversed": np.diag([-1.0, 1.0]),
-    "knee reversed": np.diag([1.0, -1.0]),
+    "hip reversed": np.diag([-1.0, 1.0]), "knee reversed": np.diag([1.0, -1.0]),
     "swapped": np.array([[0, BELT], [1 / BELT, 0]]),
     "swapped, one reversed": np.array([[0, BELT], [-1 / BELT, 0]]),
     "swapped, the other reversed": np.array([[0, -BELT], [1 / BELT, 0]]),
@@ -98,7 +97,7 @@ WRONG = {
     "belt of two thirds of the ratio": np.diag([1.0, 2 / 3]),
     "belt of one and a half times the ratio": np.diag([1.0, 1.5]),
     "belt of twice the ratio": np.diag([1.0, 2.0]),
-}
+}  # fmt: skip
 """What drives believe of the joints' motion, times what is true, (2, 2)."""
 
 

@@ -32,13 +32,11 @@ REPLIES = st.builds(
 )
 OBSERVATIONS = st.builds(
     SupervisorInput,
-    time=st.floats(0, 100),
-    late=st.just(0.0) | ANYTHING,
+    time=st.floats(0, 100), late=st.just(0.0) | ANYTHING,
     replies=st.tuples(st.none() | REPLIES, st.none() | REPLIES),
-    wanted=st.none() | st.tuples(NUMBERS, NUMBERS),
-    operator=st.sampled_from(Operator),
+    wanted=st.none() | st.tuples(NUMBERS, NUMBERS), operator=st.sampled_from(Operator),
     finished=st.booleans(),
-)
+)  # fmt: skip
 
 
 def good(index=0, **changes):

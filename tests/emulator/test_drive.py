@@ -58,6 +58,21 @@ def test_a_person_holds_the_leg_until_both_drives_are_powered():
     assert np.abs(bench.robot.leg.q - before).max() > 0.1
 
 
+def test_a_leg_that_lies_is_brought_back_once_its_drives_are_off_and_nobody_speaks():
+    bench = Bench()
+    before, bench.robot.patience = bench.robot.leg.q, 1.0
+    bench.power()
+    bench.wait(0.9)
+    bench.cycle(*(drive.make_stop() for drive in bench.drives))
+    bench.wait(0.9)
+    assert not bench.robot.held
+    assert np.abs(bench.robot.leg.q - before).max() > 0.1
+    bench.wait(1.0)
+    wires = enumerate(bench.robot.leg.transforms)
+    told = [wire.joint_position(bench.read(R.POSITION, drive=n)) for n, wire in wires]
+    assert told == pytest.approx(before, abs=1e-3), "the drives counted their turns on the way"
+
+
 @pytest.mark.parametrize(("mode", "least", "most"), [(12, 0.9, 1.01), (15, 0.0, 0.5)])
 def test_after_silence_a_drive_in_torque_mode_is_limp_unless_it_shall_brake(
     bench, mode, least, most

@@ -15,14 +15,7 @@ def transition(
         return np.array([value], dtype=float)
 
     return Transition(
-        height=row(height),
-        rate=row(rate),
-        q=row(q),
-        qd=row(qd),
-        command=row(command),
-        action=row(action),
-        last_action=row(last),
-        apex=np.array([apex]),
-        apex_height=row(height),
+        height=row(height), rate=row(rate), q=row(q), qd=row(qd), command=row(command),
+        action=row(action), last_action=row(last), apex=np.array([apex]), apex_height=row(height),
         measure_clearance=lambda: row(clearance),
-    )
+    )  # fmt: skip

@@ -8,7 +8,7 @@ from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.io import replace_at
 from hopping_leg.rl import reach
 from hopping_leg.rl.recipes import get_recipe
-from hopping_leg.rl.run_folder import RunFolder
+from hopping_leg.rl.run_folder import RunFolder, read_result
 from hopping_leg.rl.train import train
 from hopping_leg.robot import load_robot
 from tests.rl.learners import ROBOT, TINY_FAST, learn, learner, try_briefly
@@ -56,3 +56,9 @@ def test_workers_that_do_not_fit_are_refused_before_anything_is_written(tmp_path
         with pytest.raises(UsageError, match=says):
             train(recipe, ROBOT, 0, tmp_path / "run", ray=ray)
     assert not (tmp_path / "run").exists()
+
+
+def test_minutes_count_from_the_first_rollout_on(tmp_path, monkeypatch):
+    try_briefly(monkeypatch)
+    train(TINY_FAST, ROBOT, 0, tmp_path, minutes=1e-6, quiet=True)
+    assert 0 < read_result(tmp_path)["steps"] < TINY_FAST.schedule.steps

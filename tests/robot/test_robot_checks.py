@@ -75,13 +75,9 @@ def said(file):
 
 
 OTHER_UNITS = {
-    "kg": (1e3,),
-    "m": (1e3, 1e2, 39.37),
-    "kg m2": (1e9, 1e7, 1e4),
-    "N m": (1e3,),
-    "rad/s": (30 / math.pi, 180 / math.pi),
-    "rad": (180 / math.pi,),
-}
+    "kg": (1e3,), "m": (1e3, 1e2, 39.37), "kg m2": (1e9, 1e7, 1e4), "N m": (1e3,),
+    "rad/s": (30 / math.pi, 180 / math.pi), "rad": (180 / math.pi,),
+}  # fmt: skip
 """Values in other units for one in SI."""
 ENTRIES = [(p, e) for p, e in numbers(load_tree("legv2")) if e["unit"] in OTHER_UNITS]
 

@@ -54,13 +54,13 @@ class Emulate:
     homed: bool = True
     """Drives homed by hand; --no-homed: they know their position within a rotor's turn."""
     held: bool = True
-    """Hold the leg until both drives are powered; --no-held: let it fall."""
+    """Hold the leg until both drives are powered, and once they are off; --no-held: let it fall."""
     seed: int = 0
     """Seed of sensor noise and jitter."""
     realtime: bool = True
     """Take real-time priority where permitted, to answer in time; --no-realtime: do not."""
-    seconds: float | None = None
-    """Time after which the emulator ends; default: with Ctrl-C."""
+    seconds: float = math.inf
+    """Time after which the emulator ends, s, if not with Ctrl-C."""
     kinds: bool = False
     """List the kinds of faults and end."""
 
@@ -85,7 +85,7 @@ def run(args: Emulate) -> None:
         faults=() if args.faults is None else load_faults(args.faults),
     )  # fmt: skip
     robot, port = start.build(), PtyPort(args.link)
-    seconds = math.inf if args.seconds is None else args.seconds
+    robot.patience = 1.0 if args.held else math.inf
     with contextlib.closing(port), contextlib.suppress(KeyboardInterrupt):
         ids = " and ".join(str(drive.id) for drive in robot.drives)
         say(f"Drives {ids} of {robot.robot.name} behind {port}")
@@ -95,13 +95,13 @@ def run(args: Emulate) -> None:
         server = Server(robot, port)
         server.on_turn = _Events(robot).tell
         with uninterrupted():
-            server.run(lambda: robot.time >= seconds)
+            server.run(lambda: robot.time >= args.seconds)
     say(f"The emulator ended after {robot.time:.1f} s.")
 
 
 class _Events:
     def __init__(self, robot: "EmulatedRobot") -> None:
-        self._robot, self._faults_shown = robot, 0
+        self._robot, self._faults_shown, self._held = robot, 0, robot.held
         self._modes = [drive.machine.mode for drive in robot.drives]
 
     def tell(self) -> None:
@@ -111,6 +111,9 @@ class _Events:
             who = "" if fault.kind == "unplug" else f" ({fault.drive})"
             print(f"{begun:7.3f} s  fault: {KINDS[fault.kind].text}{who}", flush=True)
         self._faults_shown = len(log)
+        held, self._held = self._held, self._robot.held
+        if self._held > held:
+            print(f"{self._robot.time:7.3f} s  leg: brought back and held", flush=True)
         self._modes = [drive.machine.mode for drive in self._robot.drives]
         for name, old, drive in zip(JOINTS, before, self._robot.drives, strict=True):
             mode = drive.machine.mode

@@ -52,7 +52,7 @@ class Options:
     heights: tuple[float, float] | None = None
     """Lowest and highest command, m, instead of the recipe's."""
     minutes: float | None = None
-    """Wall-clock time of the training; default: when the recipe's steps are done."""
+    """Wall-clock time from the first rollout on; default: when the recipe's steps are done."""
     steps: int | None = None
     """Control steps of experience, all legs together, instead of the recipe's."""
     threads: int = 1

@@ -185,7 +185,7 @@ def _check(robot: Robot, limits: SafetyLimits, joint: int, facts: DriveInfo) -> 
             "position",
             f"{facts.position:.3f} rad",
             lower <= facts.position <= upper,
-            f"the {name} stands at {facts.position:.2f} rad but may only start between"
-            f" {lower:.2f} and {upper:.2f} rad; move it by hand, or home it.",
+            f"the {name} stands at {facts.position:.3f} rad but may only start between"
+            f" {lower:.3f} and {upper:.3f} rad; move it by hand, or home it.",
         ),
     ]

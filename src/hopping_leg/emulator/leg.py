@@ -17,6 +17,7 @@ from hopping_leg.robot.parameters import Joint, Robot
 from hopping_leg.sim import LegSimulator
 
 TIMESTEP = 5e-4  # Period of the drives' control, s; the physics steps more often within it
+_LIFTED = 1e-3  # Way of a joint in such a period while somebody brings the leg back, rad
 
 
 class EmulatedLeg:
@@ -42,7 +43,8 @@ class EmulatedLeg:
             free, 1, rate=1 / TIMESTEP, timestep=robot_model.TIMESTEP, threads=1
         )
         self._legs.rng = np.random.default_rng(seed)
-        self._legs.stand(slice(None), np.asarray(q, np.float64))
+        self._start = np.asarray(q, np.float64)
+        self._legs.stand(slice(None), self._start)
 
     @property
     def height(self) -> float:
@@ -69,7 +71,9 @@ class EmulatedLeg:
         )
 
     def hold(self) -> None:
-        """Stay where it is for a physics step; the sensors report with other noise."""
+        """Stay at the start for a physics step, or near it; sensors report with other noise."""
+        if (way := self._start - self._legs.q[0]).any():
+            self._legs.stand(slice(None), self._legs.q[0] + np.clip(way, -_LIFTED, _LIFTED))
         self._legs.read_sensors()
 
     def step(self, motor_torque: tuple[float, float]) -> None:

@@ -44,6 +44,8 @@ class EmulatedRobot:
         faults: Sequence[Fault] = (),
     ) -> None:
         self.robot, self.time, self.held = robot, 0.0, held
+        self.patience, self._heard = math.inf, 0.0
+        """Silence, s, after which somebody brings back and holds a leg whose drives are off."""
         self.leg = leg.EmulatedLeg(robot, q, seed)
         self.drives = tuple(_drive(robot, joint, configured) for joint in range(len(JOINTS)))
         self._latency, self._rng = robot.reality.latency, np.random.default_rng(seed)
@@ -78,7 +80,7 @@ class EmulatedRobot:
 
     def receive(self, frame: Frame) -> None:
         """Take a frame now and queue the answers; a latency of commands lets it act later."""
-        message = bus.Message.read(frame)
+        message, self._heard = bus.Message.read(frame), self.time
         late = self._latency.command + self._latency.jitter * float(self._rng.random())
         if late:
             self._last_delivery = max(self.time + late, self._last_delivery)
@@ -99,8 +101,9 @@ class EmulatedRobot:
             for drive in filter(message.is_for, self.drives):
                 bus.act(message, drive, self.time)
         hip, knee = (drive.step(self.time, leg.TIMESTEP) for drive in self.drives)
-        if self.held and all(drive.active for drive in self.drives):
-            self.held = False
+        active = [drive.active for drive in self.drives]
+        quiet = self.time - self._heard > self.patience
+        self.held = not all(active) if self.held else quiet and not any(active)
         if self.held:
             self.leg.hold()
         else:

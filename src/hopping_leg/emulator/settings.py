@@ -10,22 +10,13 @@ from hopping_leg.errors import UsageError, unknown_name
 CHANNEL = 1  # Stream channel of the console
 
 DEFAULTS: dict[str, int | float] = {
-    "id.id": 1,
-    "motor_position.output.offset": 0.0,
-    "motor_position.output.sign": 1,
-    "motor_position.rotor_to_output_ratio": 1 / 6,
-    "servo.max_voltage": 46.0,
-    "servo.fault_temperature": 75.0,
-    "servo.position_derate": 0.02,
-    "servo.pid_position.kp": 50.0,
-    "servo.pid_position.kd": 1.0,
-    "servo.default_timeout_s": 0.1,
-    "servo.timeout_max_torque_Nm": 5.0,
-    "servo.timeout_mode": 12,
-    "servo.max_current_A": 100.0,
-    "servopos.position_min": -0.01,
-    "servopos.position_max": 0.01,
-}
+    "id.id": 1, "motor_position.output.offset": 0.0, "motor_position.output.sign": 1,
+    "motor_position.rotor_to_output_ratio": 1 / 6, "servo.max_voltage": 46.0,
+    "servo.fault_temperature": 75.0, "servo.position_derate": 0.02, "servo.pid_position.kp": 50.0,
+    "servo.pid_position.kd": 1.0, "servo.default_timeout_s": 0.1,
+    "servo.timeout_max_torque_Nm": 5.0, "servo.timeout_mode": 12, "servo.max_current_A": 100.0,
+    "servopos.position_min": -0.01, "servopos.position_max": 0.01,
+}  # fmt: skip
 """Names as in ``conf get``."""
 
 

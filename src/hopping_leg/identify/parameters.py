@@ -94,33 +94,17 @@ def _units(kind: type[Any], prefix: str = "") -> dict[str, str]:
 
 
 _RANGES = {
-    "rail.friction": (0.0, 10.0),
-    "rail.damping": (0.0, 20.0),
-    "contact.time_constant": (2 * COARSE_TIMESTEP, 0.2),
-    "contact.damping_ratio": (0.1, 3.0),
-    "contact.friction": (0.2, 2.0),
-    "friction": (0.0, 1.0),
-    "damping": (0.0, 1.0),
-    "armature": (1e-6, 0.05),
-    "drive.delay": (0.0, 0.02),
-    "drive.creep": (0.0, 0.1),
-    "drive.ramp": (0.0, 1.0),
-    "drive.stiffness": (0.0, 2000.0),
-    "drive.damping": (0.0, 50.0),
-    "drive.integral": (0.0, 100.0),
-    "torque_gain": (0.5, 1.5),
-    "drive.sensor_gain": (0.5, 1.5),
-    "load_friction": (0.0, 0.5),
-    "backlash": (0.0, 0.02),
-    "efficiency": (0.5, 1.0),
-    "boom.mass": (-0.6, 0.6),
-    "boom.forward_mass": (-0.6, 1.0),
-    "boom.weight": (-5.0, 5.0),
-    "boom.hip_friction": (0.0, 1.0),
-    "boom.friction": (0.0, 3.0),
-    "boom.damping": (0.0, 10.0),
+    "rail.friction": (0.0, 10.0), "rail.damping": (0.0, 20.0),
+    "contact.time_constant": (2 * COARSE_TIMESTEP, 0.2), "contact.damping_ratio": (0.1, 3.0),
+    "contact.friction": (0.2, 2.0), "friction": (0.0, 1.0), "damping": (0.0, 1.0),
+    "armature": (1e-6, 0.05), "drive.delay": (0.0, 0.02), "drive.creep": (0.0, 0.1),
+    "drive.ramp": (0.0, 1.0), "drive.stiffness": (0.0, 2000.0), "drive.damping": (0.0, 50.0),
+    "drive.integral": (0.0, 100.0), "torque_gain": (0.5, 1.5), "drive.sensor_gain": (0.5, 1.5),
+    "load_friction": (0.0, 0.5), "backlash": (0.0, 0.02), "efficiency": (0.5, 1.0),
+    "boom.mass": (-0.6, 0.6), "boom.forward_mass": (-0.6, 1.0), "boom.weight": (-5.0, 5.0),
+    "boom.hip_friction": (0.0, 1.0), "boom.friction": (0.0, 3.0), "boom.damping": (0.0, 10.0),
     "stiffness_damping": (0.0, 0.5),
-}
+}  # fmt: skip
 """Widest bounds: by full name, else by the last part, prefixed by ``drive`` for drives."""
 _ROUGH = 10.0  # scale of a stiffness over it: the cost is so rough that slopes need 1 % of it
 _FACTOR = 4.0  # parameters without a range may lie between a quarter and four times their start

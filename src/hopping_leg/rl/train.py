@@ -52,7 +52,7 @@ def train(
         seed: Seed of weights, exploration, task, noise and delay.
         out: The run's folder.
         resume: Go on with the run in ``out``; without one, begin.
-        minutes: Stop after so much wall-clock time, pauses excluded, or at the recipe's steps.
+        minutes: Stop so long after the first rollout, pauses excluded, or at the recipe's steps.
         threads: Threads of torch and physics; torch's is set for the whole process.
         quiet: Show no progress.
         ray: Address of a Ray cluster that collects the rollouts of all workers but the first, and
@@ -99,27 +99,21 @@ class Trainer:
     """One training."""
 
     def __init__(
-        self,
-        recipe: Recipe,
-        robot: Robot,
-        folder: run_folder.RunFolder,
-        legs: Sequence[TaskLeg],
-        progress: Progress,
-        threads: int,
-        began: float,
-        ray: str | None,
-    ) -> None:
+        self, recipe: Recipe, robot: Robot, folder: run_folder.RunFolder, legs: Sequence[TaskLeg],
+        progress: Progress, threads: int, began: float, ray: str | None,
+    ) -> None:  # fmt: skip
         self.recipe, self.robot, self.folder, self.legs = recipe, robot, folder, legs
         seed, minutes = folder.config["seed"], folder.config["minutes_budget"]
         self._seconds = math.inf if minutes is None else 60 * minutes
         self.learner = recipe.make_learner(robot, seed, threads, legs, ray)
         self.learner.on_boundary = self._at_boundary
         if minutes is not None:
-            self.learner.remaining = lambda: max(0.0, 1 - self.elapsed / self._seconds)
+            self.learner.remaining = lambda: max(0.0, 1 - self._spent)
         self.selection = Selection(recipe, robot, folder.path / "snapshots")
         self.seconds: dict[str, float] = {"before the first rollout": time.monotonic() - began}
         """Time spent on each part since the run began or was resumed."""
         self._earlier, self._began, self._saved = 0.0, began, time.monotonic()
+        self._prepared = 0.0
         self._progress, self._title = progress, f"{recipe.name} seed {seed}"
 
     @property
@@ -127,11 +121,17 @@ class Trainer:
         """Wall-clock time of the training, pauses excluded, s."""
         return self._earlier + time.monotonic() - self._began
 
+    @property
+    def _spent(self) -> float:
+        """Share of the asked time that is spent; what comes before the first rollout is not."""
+        return (self.elapsed - self._prepared) / self._seconds
+
     def restore(self, tree: dict[str, Any]) -> None:
         """Go on from a checkpoint; UsageError says that another version wrote it."""
         try:
             self.learner.restore(tree["learner"])
             self.selection.rows, self._earlier = tree["history"], float(tree["elapsed"])
+            self._prepared = float(tree["prepared"])
         except (AttributeError, LookupError, RuntimeError, TypeError, ValueError) as error:
             raise errors.UsageError(
                 f"{self.folder.path} was begun by another version; train anew in another folder."
@@ -191,7 +191,9 @@ class Trainer:
 
     def tick(self) -> bool:
         """Return whether there is time left."""
-        return self.elapsed < self._seconds
+        if not self.learner.num_timesteps:
+            self._prepared = self.elapsed
+        return self._spent < 1
 
     def _at_boundary(self) -> None:
         self._show()
@@ -208,6 +210,7 @@ class Trainer:
             "learner": self.learner.state(),
             "history": self.selection.rows,
             "elapsed": self.elapsed,
+            "prepared": self._prepared,
         }
         write_checkpoint(self.folder.checkpoints, self.learner.num_timesteps, tree)
         self._saved = time.monotonic()
@@ -233,7 +236,7 @@ class Trainer:
 
     def _show(self) -> None:
         steps, error = int(self.learner.num_timesteps), self.learner.task.mean_apex_error
-        share = max(steps / self.recipe.schedule.steps, self.elapsed / self._seconds)
+        share = max(steps / self.recipe.schedule.steps, self._spent)
         notes = [f"{steps / self.elapsed:.0f} steps/s"]
         if math.isfinite(error):
             notes.append(f"apex error {1000 * error:.0f} mm")

@@ -81,18 +81,10 @@ class ShapingGains:
 
 
 POWERS_OF_SIZE = {
-    "liftoff_length": 1.0,
-    "landing_length": 1.0,
-    "height_offset": 1.0,
-    "reference": 1.0,
-    "k0_slope": -1.0,
-    "retract_time": 0.5,
-    "flight_min": 0.5,
-    "push_rate": 0.5,
-    "touchdown_rate": 0.5,
-    "flight_min_slope": -0.5,
-    "push_rate_slope": -0.5,
-}
+    "liftoff_length": 1.0, "landing_length": 1.0, "height_offset": 1.0, "reference": 1.0,
+    "k0_slope": -1.0, "retract_time": 0.5, "flight_min": 0.5, "push_rate": 0.5,
+    "touchdown_rate": 0.5, "flight_min_slope": -0.5, "push_rate_slope": -0.5,
+}  # fmt: skip
 """Gains that grow with a power of the leg's size."""
 FORCES: tuple[str, ...] = ("kp_y", "kd_y", "push_damping")
 FORCES += ("touchdown_stiffness", "touchdown_damping", "touchdown_force")
