@@ -44,12 +44,9 @@ from tests.identify.runs import SIDECAR, rig_log, swinging
 
 COUNT = int(os.environ.get("HOPPING_LEG_FUZZ", "200"))  # Files of each kind
 
-MEMORY = 3 << 30
-"""Most that reading a file may take, bytes: the 2 GiB of a table, and what the program needs."""
-
+MEMORY = 3 << 30  # Most that reading a file may take, bytes: a table's 2 GiB, and the program's
 SECONDS = 60
-LONGEST = 1500
-"""Characters of a sentence."""
+LONGEST = 1500  # Characters of a sentence
 
 NUMBER = re.compile(rb"-?\d+(\.\d+)?([eE][-+]?\d+)?")
 WORD = re.compile(rb'"[^"]*"|[A-Za-z_]\w*')

@@ -181,6 +181,10 @@ def test_what_cannot_be_read_is_said_with_what_was_found(tmp_path, text, names, 
 def test_missing_numbers_are_named_with_the_option_that_gives_them(tmp_path):
     with pytest.raises(RobotError, match=r"hip.motor.gear_ratio.*--motor qdd100.*--set motor"):
         made(tmp_path / "leg.urdf", EXAMPLE, ())
+    leg = read_leg(tmp_path / "leg.urdf")
+    del leg.numbers["base.mass"]
+    with pytest.raises(RobotError, match=r"say base.mass \(kg\); give each, e.g. --set base.mass"):
+        imported_robot(leg, "leg", ("qdd100",))
 
 
 def test_a_urdfs_mesh_without_inertial_weighs_nothing(tmp_path):

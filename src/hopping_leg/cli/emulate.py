@@ -71,8 +71,7 @@ def run(args: Emulate) -> None:
         rows, words = [], {"inf": "on", "nan": "so many replies"}
         for name, kind in KINDS.items():
             lasts = words.get(f"{kind.duration:g}", f"{kind.duration:g} s")
-            value = f"{kind.value:g}" if kind.unit else ""
-            rows.append((name, kind.text, value, kind.unit, lasts))
+            rows.append((name, kind.text, f"{kind.value:g}" if kind.unit else "", kind.unit, lasts))
         show_table(("kind", "what happens", "value", "unit", "lasts"), rows)
         return
     at_least(0, seed=args.seed)

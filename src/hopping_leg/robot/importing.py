@@ -88,12 +88,14 @@ def imported_robot(
     assumed = {p: (v, f"assumed: {why}") for p, (v, why) in _assumptions(entries).items()}
     entries = assumed | entries
     unknown = (path for path in units if path not in entries and not path.startswith("hardware."))
-    missing = [f"{path} ({units[path]})" for path in unknown if not path.endswith(".armature")]
+    missing = [path for path in unknown if not path.endswith(".armature")]
     if missing:
-        raise RobotError(
-            f"{origin} does not say {', '.join(missing)}; name the motor, --motor"
-            f" {' or '.join(MOTORS)}, or give each, e.g. --set motor.gear_ratio=9."
-        )
+        named = ", ".join(f"{path} ({units[path]})".removesuffix(" (1)") for path in missing)
+        remedy = f"give each, e.g. --set {missing[0]}=1."
+        if any(".motor." in path for path in missing):
+            named_motor = f"name the motor, --motor {' or '.join(MOTORS)}"
+            remedy = f"{named_motor}, or give each, e.g. --set motor.gear_ratio=9."
+        raise RobotError(f"{origin} does not say {named}; {remedy}")
     file = Path(origin).name
     tree: Tree = {"name": safe_file_name(leg.name), "description": f"imported from {file}"}
     for path in (path for path in units if path in entries):

@@ -14,11 +14,8 @@ _LOGGING = mujoco.MjLogConfig.get()
 _LOGGING.logto_file = False
 _LOGGING.set()
 
-GRAVITY = 9.81
-"""Standard gravity, m/s2; leg.xml states the same."""
-
-CONTROL_RATE = 200.0
-"""Control rate of the paper, Hz."""
+GRAVITY = 9.81  # Standard gravity, m/s2; leg.xml states the same
+CONTROL_RATE = 200.0  # That of the paper, Hz
 
 TIMESTEP = 1.25e-4
 """Physics step of environment and evaluation, s, see ``python -m studies.physics_step``."""
