@@ -224,7 +224,7 @@ def _described(
         if new not in COLUMNS:
             raise RecordingError(f"{file}: {unknown_name('recording column', new, COLUMNS)}")
         if old not in table.columns:
-            raise RecordingError(f"{file}: {origin} {unknown_name('column', old, table.columns)}")
+            raise RecordingError(f"{file}: {origin}: {unknown_name('column', old, table.columns)}")
     table = table.with_columns(pl.col(old).alias(new) for new, old in names.items())
     if "row" not in table.columns:
         table = table.with_columns(pl.int_range(pl.len()).alias("row"))

@@ -5,6 +5,7 @@ every row's torque must be, k (q* - q) + d (q'* - q') + feed-forward: measured t
 where all is right, and its correlation is highest at the right row.
 """
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NoReturn
@@ -69,7 +70,11 @@ def check_table(inspection: Inspection) -> None:
     if inspection.table.height == 0:
         inspection.refuse("there are no rows below its header; record again")
     if "time_s" not in inspection.table.columns:
-        inspection.refuse("there is no column 'time_s'; a recording needs time and position")
+        names = ", ".join(name for name in inspection.table.columns if name != "row")
+        inspection.refuse(
+            f"there is no column 'time_s' among {names}; a recording needs time and position: name"
+            " their columns in the sidecar's table [columns]"
+        )
     _check_clock(inspection)
     _drop_garbage(inspection)
     _drop_startup(inspection)
@@ -127,9 +132,11 @@ def _check_clock(inspection: Inspection) -> None:
         )
     step = float(np.median(steps))
     if not 0.5 <= step * metadata.rate_hz <= _SPARSEST:
+        over = round(math.log10(step * metadata.rate_hz))
+        unit = {3: " (in ms?)", 6: " (in us?)", 9: " (in ns?)"}.get(over, "")
         inspection.refuse(
-            f"column 'time_s' steps by {step:.3g} from row to row but the metadata's rate_hz ="
-            f" {metadata.rate_hz:g} means {metadata.period:.3g} s; one of the two is wrong"
+            f"column 'time_s' steps by {step:.3g}{unit} from row to row but the metadata's rate_hz"
+            f" = {metadata.rate_hz:g} means {metadata.period:.3g} s; one of the two is wrong"
         )
 
 
