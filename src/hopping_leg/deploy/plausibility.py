@@ -14,10 +14,9 @@ leave room for impacts, play and noise, and were set on simulated runs:
 """
 
 import math
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
 
-from hopping_leg.deploy.drive_link import DriveMode, Pair, Reply
+from hopping_leg.deploy.drive_link import DriveMode, Pair, Replies, Reply
 
 _STILL_RADIANS, _STILL_SPEED = 1e-6, 1e-3
 """Change of a position between two replies, and speed, rad/s, up to which a joint is at rest to the
@@ -196,6 +195,7 @@ class LagEvidence:
         changes: Sum of squared changes of the torques told, likewise.
         usual: Least of these lags, 0 the first, that ever explained the torques clearly best.
         late: Ticks in a row that another, a tick or more after it, explained them far better.
+        gap: Ticks since both drives answered.
     """
 
     told: tuple[Pair, ...] = ()
@@ -204,21 +204,25 @@ class LagEvidence:
     changes: float = 0.0
     usual: int = _LAGS
     late: int = 0
+    gap: int = 1
 
     def after(
-        self, motors: tuple[MotorLine, MotorLine], replies: tuple[Reply, Reply], told: Pair
+        self, motors: tuple[MotorLine, MotorLine], replies: Replies, told: Pair
     ) -> "LagEvidence":
-        """Return the evidence with fresh replies of both drives, a tick after the last ones."""
+        """Return the evidence a tick later, which a lost reply leaves as it was."""
         past = (told, *self.told)[: _LAG_FADING + 1]
-        hip, knee = (r.torque / m.limit for r, m in zip(replies, motors, strict=True))
-        if len(past) <= _TICKS:
+        fresh = [reply for reply in replies if reply is not None]
+        if len(fresh) < len(replies):
+            return replace(self, told=past, gap=self.gap + 1)
+        hip, knee = (r.torque / m.limit for r, m in zip(fresh, motors, strict=True))
+        if len(past) < _TICKS + self.gap:
             return LagEvidence(past, (hip, knee), usual=self.usual)
         fading = math.exp(-1 / _LAG_FADING)
         errors, changes = [fading * error for error in self.errors], fading * self.changes
         for joint, given in enumerate((hip - self.given[0], knee - self.given[1])):
-            velocity = replies[joint].velocity
-            shares = [motors[joint].share(pair[joint], velocity) for pair in past[: _TICKS + 1]]
-            steps = [newer - older for newer, older in pairwise(shares)]
+            velocity = fresh[joint].velocity
+            shares = [motors[joint].share(pair[joint], velocity) for pair in past]
+            steps = [a - b for a, b in zip(shares, shares[self.gap :], strict=False)]
             for lag in range(_LAGS):
                 off = given - (steps[lag // 2] + steps[(lag + 1) // 2]) / 2
                 errors[lag] += off * off  # an overflow is infinite

@@ -56,10 +56,10 @@ class Reason(IntEnum):
     CONTROLLER_SLOW = 28, "The controller took too much of a control period."
 
 
-_DRIFT_SECONDS = 1.0  # Time after which a drift is forgotten
-_DRIFT_SPEED = 2.0  # rad/s; what is faster counts as that while a joint is shaken
+_DRIFT_SECONDS = 0.5  # Time after which a drift is forgotten
 _GAP = 1.5  # Periods between two replies beyond which velocities no longer tell the way between
-_IMPACT = 3.0  # Change of speed between two replies beyond which they do not, rad/s
+_VELOCITY_AGE = 3e-3  # s by which drives filter it, as leg V2's hops on its boom show
+_DRIFT_MOST = 0.2  # rad, at any speed
 
 _ON_TIME = 0.2
 """Of a late tick that one in time makes up for: one late tick in six is tolerated for ever."""
@@ -153,10 +153,7 @@ class Counts:
             overruns, late = self.overruns + 1, seen.late
         drift = self._drifted(0, limits, hip[0]), self._drifted(1, limits, knee[0])
         evidence = self._known(0, limits, seen, told), self._known(1, limits, seen, told)
-        fresh_hip, fresh_knee = seen.replies
-        lag = LagEvidence(usual=self.lag.usual)
-        if fresh_hip is not None and fresh_knee is not None:
-            lag = self.lag.after(limits.motors, (fresh_hip, fresh_knee), told)
+        lag = self.lag.after(limits.motors, seen.replies, told)
         return Counts(
             (hip[0], knee[0]), (hip[1], knee[1]), (hip[2], knee[2]),
             overruns, late, drift, evidence, lag,
@@ -171,16 +168,12 @@ class Counts:
         return known.after(limits.motors[index], self.last[index], reply, told[index])
 
     def _drifted(self, index: int, limits: SafetyLimits, reply: Reply | None) -> float:
-        """Return a drive's drift with a reply; across a gap or an impact it is unknown."""
+        """Return a drive's drift with a reply; across a gap it is unknown."""
         last, drift = self.last[index], self.drift[index]
-        if reply is None or last is None or abs(reply.velocity - last.velocity) > _IMPACT:
+        elapsed = reply.taken - last.taken if reply and last else 0.0
+        if reply is None or last is None or not 0 < elapsed < _GAP * limits.period:
             return drift
-        elapsed = reply.taken - last.taken
-        if not 0 < elapsed < _GAP * limits.period:
-            return drift
-        most = _DRIFT_SPEED * elapsed if self.evidence[index].shaken > _IMPACT else math.inf
-        gained = max(-most, min(most, _unexplained(last, reply)))
-        return drift * math.exp(-elapsed / _DRIFT_SECONDS) + gained
+        return drift * math.exp(-elapsed / _DRIFT_SECONDS) + _unexplained(last, reply)
 
     def _of_drive(
         self, index: int, limits: SafetyLimits, reply: Reply | None
@@ -205,15 +198,16 @@ def find_cause(
     The counts are those before and after the tick; ``arming`` tells whether the drives are still
     on their way into torque control.
     """
-    for index, reply in enumerate(seen.replies):
-        if reply is not None:
-            found = _of_drive(reply, now, arming=arming) or _of_joint(
-                limits, index, before.last[index], reply
-            )
-            if found is not None:
-                return Cause(found.reason, f"{JOINTS[index]}: {found.detail}")
+    fresh = [(index, reply) for index, reply in enumerate(seen.replies) if reply is not None]
+    for index, reply in sorted(fresh, key=lambda pair: pair[1].mode != DriveMode.FAULT):
+        found = _of_drive(reply, now, arming=arming) or _of_joint(
+            limits, index, before.last[index], reply
+        )
+        if found is not None:
+            return Cause(found.reason, f"{JOINTS[index]}: {found.detail}")
     for index, joint in enumerate(JOINTS):
-        if not abs(now.drift[index]) <= limits.drift:
+        filtered = _VELOCITY_AGE * abs(last.velocity) if (last := now.last[index]) else 0.0
+        if not abs(now.drift[index]) <= min(limits.drift + filtered, _DRIFT_MOST):
             return Cause(Reason.ENCODER_DRIFT, f"{joint}: {abs(now.drift[index]):.3g} rad off")
         evidence = now.evidence[index]
         for reason, complaint in (
@@ -237,16 +231,14 @@ def find_cause(
 
 
 def _of_drive(reply: Reply, now: Counts, *, arming: bool) -> Cause | None:
-    if reply.mode == DriveMode.POSITION:
-        return None
     if reply.mode == DriveMode.FAULT:
         return Cause(Reason.DRIVE_FAULT, fault_text(reply.fault))
+    if reply.mode == DriveMode.POSITION or (arming and reply.mode <= DriveMode.CALIBRATED):
+        return None
     if reply.mode == DriveMode.TIMEOUT and now.overruns:
         return Cause(Reason.LOOP_STALLED, f"the drive's watchdog tripped, {_late_text(now.late)}")
     if reply.mode == DriveMode.TIMEOUT:
         return Cause(Reason.DRIVE_TIMEOUT, "mode 11")
-    if arming and reply.mode <= DriveMode.CALIBRATED:
-        return None
     return Cause(Reason.DRIVE_LEFT_MODE, f"mode {reply.mode}")
 
 
