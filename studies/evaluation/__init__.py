@@ -3,8 +3,7 @@
 _HEIGHTS = ",".join(f"{0.22 + 0.01 * step:.2f}" for step in range(20))
 """Heights from 0.22 to 0.41 m."""
 
-_BASELINES = "energy-shaping energy-shaping-flying"
-
+_BASELINES, _TUNED = "energy-shaping energy-shaping-flying", "energy-shaping energy-shaping-tuned"
 
 _FRESH = 2000
 """First seed of trials that no choice of the recipe `universal` has seen."""
@@ -35,6 +34,8 @@ RESULTS = (
     ),
     "hop report runs/results/traces/*.parquet --out studies/evaluation/figures",
     _trials(f"paper {_BASELINES} energy-shaping-literal", "paper.json", "--seeds 10"),
+    _trials(f"rl fast universal {_TUNED}", "cost.json", f"--floor soft --seeds 3 --seed {_FRESH}"),
+    _trials(f"paper {_TUNED}", "cost_paper.json", f"--floor soft --seeds 3 --seed {_FRESH}"),
     *(_universal(robot) for robot in LEGS),
     _every_cm("every_cm"),
     _every_cm("every_cm_fine_step", "--timestep 3.125e-05"),

@@ -29,7 +29,7 @@ def test_tuned_hops_to_the_command_through_noise_and_delay(tuned):
         assert len(window.apex) >= 6
         assert abs(np.median(window.apex - window.command)) < 0.008
         assert np.std(window.apex) < 0.010
-        assert window.base_contacts == window.knee_contacts == 0
+        assert window.contacts("base") == window.contacts("knee") == 0
 
 
 def test_phases_follow_each_other_in_order(tuned):
@@ -61,7 +61,7 @@ def test_gains_carry_over_to_other_legs_and_rates(robot, command, rate):
     window = measure(hop(tuned_energy_shaping(leg, rate=rate), setup, (command,)).trace(0))[0]
     assert len(window.apex) >= 4
     assert abs(np.median(window.apex - window.command)) < 0.02
-    assert window.base_contacts == window.knee_contacts == 0
+    assert window.contacts("base") == window.contacts("knee") == 0
 
 
 def test_feedforward_force_does_the_work_of_the_climb_and_is_bounded_for_an_extended_leg():

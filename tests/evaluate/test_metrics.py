@@ -66,7 +66,7 @@ def test_contacts_are_counted_as_events_even_while_the_run_settles():
     base[0:5] = -0.01
     touched = with_column(with_column(trace, "knee_clearance_m", knee), "base_clearance_m", base)
     window = window_of(touched)
-    assert (window.base_contacts, window.knee_contacts) == (1, 2)
+    assert (window.contacts("base"), window.contacts("knee")) == (1, 2)
 
 
 def test_a_hop_missed_right_after_a_switch_is_seen_in_the_whole_run():

@@ -3,6 +3,7 @@ import polars as pl
 import pytest
 
 from hopping_leg.evaluate.motor_load import motor_load
+from hopping_leg.robot import GRAVITY
 from hopping_leg.sim import LOADS
 from hopping_leg.trace import Trace
 from tests.evaluate.test_metrics import sine_trace
@@ -45,7 +46,14 @@ def test_power_of_motors_and_bus(robot):
     assert load.peak_regeneration_w == 42
     load, current = motor_load([torque(robot, 6.0, 0.0)], robot), 6.0 / (6 * 0.0788)
     assert load.mean_electrical_power_w == pytest.approx(1.5 * current**2 * 0.150), "windings"
-    assert load.mean_power_w == 0
+    assert load.hip_heat_w == pytest.approx(load.mean_electrical_power_w)
+    assert load.mean_power_w == load.knee_heat_w == 0
+
+
+def test_the_peak_of_the_ground_force_is_the_median_of_those_of_runs(robot):
+    weight = robot.mass * GRAVITY
+    force = [part(robot, ground_force=weight * np.linspace(0, most, TICKS)) for most in (3, 9, 4)]
+    assert motor_load(force, robot).peak_ground_force_weights == pytest.approx(4)
 
 
 def test_the_bus_rises_by_what_is_not_used_up(robot):
@@ -80,7 +88,6 @@ def test_limits_and_stops(robot):
                hip_command_nm=15.0, stop_contact=stop)  # fmt: skip
     load = motor_load([one, one], robot)
     assert load.outside_limits_fraction == 0.25
-    assert load.soft_limit_rms_nm == pytest.approx(5)
     assert load.soft_limit_share == pytest.approx(0.25)
     assert load.stop_contacts == 4
 
@@ -88,6 +95,6 @@ def test_limits_and_stops(robot):
 def test_of_a_leg_that_tells_nothing_nothing_is_known(robot):
     load = motor_load([sine_trace()], robot)
     assert np.isnan([load.rms_hip_torque_nm, load.thermal_minutes, load.mean_power_w]).all()
-    assert np.isnan([load.bus_voltage_rise_v, load.soft_limit_rms_nm]).all()
+    assert np.isnan([load.bus_voltage_rise_v, load.peak_ground_force_weights]).all()
     assert load.stop_contacts is None
     assert load.torque_reversals_hz == 0, "the commanded torque is in every trace"

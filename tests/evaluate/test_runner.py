@@ -13,24 +13,27 @@ from hopping_leg.evaluate.robustness import Suite, run_suite
 from hopping_leg.evaluate.robustness_axes import axes_named
 from hopping_leg.evaluate.runner import load_entries
 from hopping_leg.evaluate.trials import COMMANDS, choose_commands, floor_robot, paper_trials
-from hopping_leg.robot import load_robot
+from hopping_leg.robot import GRAVITY, load_robot
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 from tests.evaluate.conftest import Spring
 
 
-def test_summary_rows_pool_fixed_trials_and_the_sequence(judged):
+def test_summary_rows_pool_fixed_trials_and_the_sequence(judged, robot):
     rows = judged.evaluation.summary
     assert [(r.controller, r.robot, r.command_m) for r in rows] == [
         ("spring", "legv2-paper", 0.25),
         ("spring", "legv2-paper", 0.35),
     ]
     assert all(row.runs == 4 for row in rows)
-    assert rows[0].measured_s == pytest.approx(2 * (13 + 3))
-    assert rows[1].measured_s == pytest.approx(2 * (13 + 4))
+    assert [r.hops / r.hop_rate_hz for r in rows] == pytest.approx([2 * (13 + 3), 2 * (13 + 4)])
     apexes = judged.evaluation.distributions[1]["apexes_m"]
     assert rows[1].hops == len(apexes) > 20
     assert rows[1].median_error_m == pytest.approx(np.median(apexes) - 0.35, abs=1e-5)
     assert rows[1].std_m == pytest.approx(np.std(apexes), abs=1e-5)
+    least = robot.mass * GRAVITY * (np.mean(apexes) - judged.runs[0].trace.column("height_m")[0])
+    assert rows[1].ballistic_energy_j == pytest.approx(least, abs=1e-3)
+    used = rows[1].energy_over_ballistic * least * rows[1].hop_rate_hz
+    assert used == pytest.approx(rows[1].mean_electrical_power_w, rel=1e-3)
     assert rows[1].median_error_low_m <= rows[1].median_error_m <= rows[1].median_error_high_m
 
 

@@ -1,5 +1,4 @@
 import dataclasses
-import itertools
 
 import numpy as np
 import pytest
@@ -7,16 +6,8 @@ from scipy import stats
 
 from hopping_leg.evaluate import statistics
 from hopping_leg.evaluate.metrics import errors_of
-from hopping_leg.evaluate.statistics import cliffs_delta, compare, median_interval
+from hopping_leg.evaluate.statistics import compare, median_interval
 from tests.evaluate.test_metrics import sine_trace, window_of
-
-
-def test_cliffs_delta_counts_pairs():
-    rng = np.random.default_rng(0)
-    lower, upper = rng.normal(0, 1, 30), rng.normal(0.5, 1, 20)
-    lower[:5] = upper[:5]
-    pairs = [np.sign(u - v) for u, v in itertools.product(upper, lower)]
-    assert cliffs_delta(lower, upper) == pytest.approx(np.mean(pairs))
 
 
 def test_runs_with_offsets_of_their_own_are_not_taken_for_one_sample():

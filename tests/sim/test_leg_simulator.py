@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.io import replace_at
-from hopping_leg.robot import Boom, DriveMismatch, GroundMismatch, Latency, load_robot
+from hopping_leg.robot import GRAVITY, Boom, DriveMismatch, GroundMismatch, Latency, load_robot
 from hopping_leg.robot.model_mismatch import MassScale, SensorMismatch
 from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.randomization import draw_twin
@@ -49,16 +49,8 @@ def noiseless(robot):
 
 
 def rows(legs):
-    return np.concatenate(
-        [
-            legs.state,
-            legs.measured_q,
-            legs.measured_qd,
-            legs.measured_torque,
-            legs.records["loads"],
-        ],
-        axis=1,
-    )
+    sensed = legs.measured_q, legs.measured_qd, legs.measured_torque
+    return np.concatenate([legs.state, *sensed, legs.records["loads"]], axis=1)
 
 
 def shaken(legs, ticks=40, seed=1):
@@ -202,10 +194,21 @@ def test_loads_are_means_extremes_and_contacts_of_the_steps(robot):
         for _ in range(10):
             given_torque = fine.step(torque)[0]
             steps.append([*given_torque**2, *(given_torque * fine.measured_qd[0])])
-            steps[-1] += [sum(steps[-1][2:]), *np.abs(fine.qd[0]), fine.records["loads"][0, 7]]
+            steps[-1] += [sum(steps[-1][2:]), *np.abs(fine.qd[0]), *fine.records["loads"][0, 7:]]
         steps = np.array(steps)
         expected = [*steps[:, :4].mean(0), steps[:, 4].min(), *steps[:, 5:].max(0)]
         np.testing.assert_allclose(coarse.records["loads"][0], expected, rtol=1e-9, atol=1e-12)
+
+
+def test_the_ground_bears_nothing_in_the_air_and_the_weight_at_rest():
+    rubbing, forces = replace_at(CAD, "rail.friction", 2.0), []
+    legs, weight = standing([rubbing]), CAD.mass * GRAVITY
+    for _ in range(600):
+        legs.step(np.zeros((1, 2)))
+        forces.append(legs.records["loads"][0, 8] / weight)
+    assert forces[0] == pytest.approx(0, abs=1e-9), "what the rail bears is not the ground's"
+    assert max(forces) > 2
+    assert forces[-1] == pytest.approx(1, abs=2.0 / weight)
 
 
 @pytest.mark.parametrize("joint", [0, 1])

@@ -39,15 +39,9 @@ class HopWindow:
     part: Trace
     """The stretch itself."""
 
-    @property
-    def base_contacts(self) -> int:
-        """Times the base touched the ground, over the whole stretch."""
-        return motor_load.events(self.part.column("base_clearance_m") <= 0)
-
-    @property
-    def knee_contacts(self) -> int:
-        """Times the knee touched the ground, over the whole stretch."""
-        return motor_load.events(self.part.column("knee_clearance_m") <= 0)
+    def contacts(self, part: str) -> int:
+        """Count how often ``"base"`` or ``"knee"`` touched the ground, over the whole stretch."""
+        return motor_load.events(self.part.column(f"{part}_clearance_m") <= 0)
 
 
 def measure(trace: Trace) -> list[HopWindow]:

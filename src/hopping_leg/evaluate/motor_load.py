@@ -1,4 +1,4 @@
-"""What hopping asks of the motors, of their drives and of the bus that feeds them.
+"""What hopping asks of the motors, of their drives, of the bus that feeds them and of the ground.
 
 Windings lose P = 3/2 R (tau / (N k_t))^2, with tau at the joint, N the gear's and belt's ratio, k_t
 and R the rotor's torque constant and the resistance of a phase: moteus' own formula for its power.
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.robot.parameters import JOINTS, Robot
+from hopping_leg.robot import GRAVITY, JOINTS, Robot
 from hopping_leg.sim import LOADS
 from hopping_leg.trace import Trace
 
@@ -31,13 +31,14 @@ class MotorLoad:
 
     outside_limits_fraction: float
     """Share of time in which a joint's true angle is outside its soft limits."""
-    soft_limit_rms_nm: float
-    """RMS of what the soft limits' PD added at both joints, root of the sum of their squares."""
     soft_limit_share: float
-    """Share of the PD's RMS in the sum of it and the controller's own."""
+    """Share of their PD's RMS, of both joints, in the sum of it and the controller's own."""
     rms_hip_torque_nm: float
     """At the joint, over physics steps."""
     rms_knee_torque_nm: float
+    hip_heat_w: float
+    """Mean loss of the windings."""
+    knee_heat_w: float
     rated_torque_share: float
     """RMS torque over the motor's rated one, of the motor that has more of it."""
     thermal_minutes: float
@@ -53,6 +54,8 @@ class MotorLoad:
     """Largest mechanical power that both motors together take out at one physics step."""
     bus_voltage_rise_v: float
     """Of the worst burst of braking, less the windings' loss, on a bus that takes none of it."""
+    peak_ground_force_weights: float
+    """Highest vertical force of the ground in a run over the leg's weight, median over runs."""
     stop_contacts: int | None
     """Times a joint touched a mechanical stop; None where the simulation does not tell it."""
 
@@ -76,19 +79,22 @@ def motor_load(parts: Sequence[Trace], robot: Robot) -> MotorLoad:
     gain = robot.of_joints("belt_ratio") * [j.motor.gear_ratio for j in joints]
     gain *= [servo.torque_constant for servo in servos]
     loss = 1.5 * np.array([servo.winding_resistance for servo in servos]) / gain**2
+    heat = (loss * square).mean(axis=0)
     bus = (power + loss * square).sum(axis=1)
     rms, added, own = np.sqrt(square.mean(axis=0)), _rms(soft), _rms(command)
     share = rms / [joint.motor.rated_torque * joint.belt_ratio for joint in joints]
     outside = (angle < robot.of_joints("lower")) | (angle > robot.of_joints("upper"))
     stops = np.split(loads["stop_contact"], ends[:-1])
+    forces = [force.max() for force in np.split(loads["ground_force"], ends[:-1])]
     stored = max(_stored(-b * period) for b in np.split(bus, ends[:-1]))
     start, capacitance = robot.hardware.bus_voltage, robot.hardware.bus_capacitance
     return MotorLoad(
         outside_limits_fraction=float(outside.any(axis=1).mean()),
-        soft_limit_rms_nm=added,
         soft_limit_share=added / (added + own) if added + own else 0.0,
         rms_hip_torque_nm=float(rms[0]),
         rms_knee_torque_nm=float(rms[1]),
+        hip_heat_w=float(heat[0]),
+        knee_heat_w=float(heat[1]),
         rated_torque_share=float(share.max()),
         thermal_minutes=min(map(_minutes, share, [s.thermal_time_constant for s in servos])),
         peak_knee_speed_rad_s=float(loads["knee_peak_speed"].max()),
@@ -97,6 +103,7 @@ def motor_load(parts: Sequence[Trace], robot: Robot) -> MotorLoad:
         mean_electrical_power_w=float(bus.mean()),
         peak_regeneration_w=float(np.maximum(-loads["least_power"], 0).max()),
         bus_voltage_rise_v=float(np.sqrt(start**2 + 2 * stored / capacitance) - start),
+        peak_ground_force_weights=float(np.median(forces)) / (robot.mass * GRAVITY),
         stop_contacts=None if np.isnan(rms).any() else sum(events(touch > 0) for touch in stops),
     )
 

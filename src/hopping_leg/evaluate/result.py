@@ -14,7 +14,7 @@ from hopping_leg.evaluate.motor_load import UNKNOWN, MotorLoad, motor_load
 from hopping_leg.evaluate.prediction import Prediction
 from hopping_leg.evaluate.trials import Run
 from hopping_leg.io import plain
-from hopping_leg.robot import Robot
+from hopping_leg.robot import GRAVITY, Robot
 
 SCHEMA = 2  # Version of the JSON, raised when a name changes its meaning
 
@@ -38,13 +38,18 @@ class Summary(MotorLoad):
     """Mean of |apex - command|, misses included."""
     std_m: float
     """Hop-to-hop standard deviation of the apex."""
-    iqr_m: float
-    """Interquartile range of the apex."""
     hops: int
     """In-flight apexes counted."""
     skipped_hops: int
     stance_bounces: int
     hop_rate_hz: float
+    energy_per_hop_j: float
+    """``mean_power_w`` over the hop rate."""
+    electrical_energy_per_hop_j: float
+    ballistic_energy_j: float
+    """Least for a landing that gives nothing back: m g from the height of the start to the apex."""
+    energy_over_ballistic: float
+    """Electrical energy of a hop over it."""
     flight_fraction: float
     min_base_height_m: float
     max_sink_m: float
@@ -54,8 +59,6 @@ class Summary(MotorLoad):
     knee_contacts: int
     peak_hip_torque_nm: float
     peak_knee_torque_nm: float
-    measured_s: float
-    """Time in which hops were counted."""
     runs: int
     missed_runs: int
     """Runs without a hop: their errors are misses, standing height minus command."""
@@ -184,14 +187,11 @@ def _staircase(label: str, steps: Windows) -> Staircase:
     per_run = np.array([[statistics.of(np.median, w.apex) for w in step] for step in windows])
     runs = [run for run, _ in next(iter(steps.values()))]
     return Staircase(
-        controller=label,
-        commands_m=list(steps),
-        median_apexes_m=medians.tolist(),
+        controller=label, commands_m=list(steps), median_apexes_m=medians.tolist(),
         monotone=bool((np.diff(medians) > 0).all() and hopped),
         monotone_runs=int((np.diff(per_run, axis=0) > 0).all(axis=0).sum()),
-        runs=len(runs),
-        skipped_hops=sum(metrics.skipped_in_run(run.trace) for run in runs),
-    )
+        runs=len(runs), skipped_hops=sum(metrics.skipped_in_run(run.trace) for run in runs),
+    )  # fmt: skip
 
 
 def summarise(
@@ -209,34 +209,33 @@ def summarise(
     low, high = statistics.median_interval(errors, seed)
     settled = sum(w.settled for w in windows)
     per_second = 1 / settled if settled else float("nan")
-    quartiles = np.percentile(apex, [25, 75]) if len(apex) else np.full(2, np.nan)
+    period = settled / len(apex) if len(apex) else np.nan
+    electrical = load.mean_electrical_power_w * period
+    lift = statistics.of(np.mean, apex) - np.mean([w.standing for w in windows])
+    ballistic = float(robot.mass * GRAVITY * lift) if robot else np.nan
     whole = pl.concat([part.table.select(_WHOLE) for part in parts])
-    base, knee = sum(w.base_contacts for w in windows), sum(w.knee_contacts for w in windows)
+    base, knee = (sum(w.contacts(name) for w in windows) for name in ("base", "knee"))
     return Summary(
         controller=controller,
         robot=str(parts[0].header.get("robot", "")),
         command_m=command,
         median_error_m=float(np.median(every)),
-        median_error_low_m=low,
-        median_error_high_m=high,
+        median_error_low_m=low, median_error_high_m=high,
         median_abs_error_m=float(np.median(np.abs(every))),
         mean_abs_error_m=float(np.abs(every).mean()),
         std_m=statistics.of(np.std, apex),
-        iqr_m=float(quartiles[1] - quartiles[0]),
         hops=len(apex),
         skipped_hops=sum(w.skipped for w in windows),
         stance_bounces=sum(w.bounces for w in windows),
         hop_rate_hz=len(apex) * per_second,
+        energy_per_hop_j=load.mean_power_w * period,
+        electrical_energy_per_hop_j=electrical, ballistic_energy_j=ballistic,
+        energy_over_ballistic=electrical / ballistic if ballistic > 0 else np.nan,
         flight_fraction=sum(w.flight for w in windows) * per_second,
         min_base_height_m=float(whole["height_m"].to_numpy().min()),
         max_sink_m=max(0.0, float(-whole["foot_clearance_m"].to_numpy().min())),
-        body_contacts=base + knee,
-        base_contacts=base,
-        knee_contacts=knee,
+        body_contacts=base + knee, base_contacts=base, knee_contacts=knee,
         peak_hip_torque_nm=float(np.abs(whole["hip_torque_nm"].to_numpy()).max()),
         peak_knee_torque_nm=float(np.abs(whole["knee_torque_nm"].to_numpy()).max()),
-        measured_s=settled,
-        runs=len(windows),
-        missed_runs=sum(not len(w.apex) for w in windows),
-        **vars(load),
-    )
+        runs=len(windows), missed_runs=sum(not len(w.apex) for w in windows), **vars(load),
+    )  # fmt: skip

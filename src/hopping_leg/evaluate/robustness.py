@@ -189,7 +189,7 @@ def outcome(case: Case, windows: Sequence[metrics.HopWindow]) -> dict[str, Any]:
         "error_m": error,
         "missed": missed,
         "skipped": skipped,
-        "contacts": sum(w.base_contacts + w.knee_contacts for w in windows),
+        "contacts": sum(w.contacts("base") + w.contacts("knee") for w in windows),
         "success": skipped == 0 and not missed and abs(error) <= TOLERANCE,
     }
 

@@ -68,9 +68,7 @@ class Neighbours:
     """Two neighbouring commands compared, as in the paper's Fig. 9."""
 
     lower_m: float
-    """The lower command, m."""
     upper_m: float
-    """The higher command, m."""
     runs: int
     """Pairs of runs with hops at both commands; a run that asks for both is its own pair."""
     p: float
@@ -104,16 +102,11 @@ def compare(
     scores = [stats.ranksums(b, a).statistic for a, b in pairs]  # normal, direction kept
     low, high = bootstrap(deltas, np.mean, seed)
     return Neighbours(
-        lower_m=lower_m,
-        upper_m=upper_m,
-        runs=len(pairs),
+        lower_m=lower_m, upper_m=upper_m, runs=len(pairs), overlap=float(between.mean()),
         p=float(2 * stats.norm.sf(abs(np.sum(scores)) / math.sqrt(len(scores)))),
-        cliffs_delta=float(np.mean(deltas)),
-        cliffs_delta_low=float(low),
-        cliffs_delta_high=float(high),
-        overlap=float(between.mean()),
-        pooled_p=float(stats.ranksums(above, below).pvalue),
-    )
+        cliffs_delta=float(np.mean(deltas)), cliffs_delta_low=float(low),
+        cliffs_delta_high=float(high), pooled_p=float(stats.ranksums(above, below).pvalue),
+    )  # fmt: skip
 
 
 def cliffs_delta(lower: Array, upper: Array) -> float:

@@ -29,6 +29,9 @@ _LOOKS: dict[str, tuple[str, float, str]] = {
     "_share": ("%", 100, ".0f"),
     "_rad_s": ("rad/s", 1, ".1f"),
     "_minutes": ("min", 1, ".1f"),
+    "_j": ("J", 1, ".1f"),
+    "_weights": ("weights", 1, ".1f"),
+    "energy_over_ballistic": ("", 1, ".1f"),
     "_hz": ("Hz", 1, ".2f"),
     "_nm": ("N\N{NO-BREAK SPACE}m", 1, ".1f"),
     "_m": ("mm", 1e3, ".1f"),
@@ -76,13 +79,15 @@ SHORT = _columns(f"{_SHORT} body_contacts")  # What the terminal shows of the su
 _ERROR = "median_error_m median_error_low_m median_error_high_m"
 
 TABLES = {
-    "summary": f"{_HOW} {_ERROR} std_m iqr_m hops skipped_hops hop_rate_hz flight_fraction"
+    "summary": f"{_HOW} {_ERROR} std_m hops skipped_hops hop_rate_hz flight_fraction"
     " max_sink_m min_base_height_m body_contacts",
     "load": f"{_HOW} peak_hip_torque_nm peak_knee_torque_nm rms_hip_torque_nm rms_knee_torque_nm"
     " rated_torque_share thermal_minutes mean_power_w mean_electrical_power_w peak_regeneration_w"
     " bus_voltage_rise_v",
+    "cost": f"{_HOW} energy_per_hop_j electrical_energy_per_hop_j ballistic_energy_j"
+    " energy_over_ballistic hip_heat_w knee_heat_w peak_ground_force_weights",
     "joints": f"{_HOW} peak_knee_speed_rad_s torque_reversals_hz outside_limits_fraction"
-    " soft_limit_rms_nm soft_limit_share stop_contacts",
+    " soft_limit_share stop_contacts",
     "ladder": f"{_HOW} median_error_m std_m hops skipped_hops body_contacts",
     "staircase": "controller commands_m median_apexes_m monotone monotone_runs runs skipped_hops",
     "distributions": "controller lower_m upper_m p cliffs_delta cliffs_delta_low"
@@ -94,7 +99,7 @@ TABLES = {
 def evaluation_tables(evaluation: Row) -> dict[str, Markup]:
     """Return every table of a page, by what it is about, from an evaluation's JSON."""
     summary, secondary = evaluation["summary"], evaluation["secondary"] or {"summary": []}
-    rows = {**evaluation, "load": summary, "joints": summary}
+    rows = {**evaluation, "load": summary, "cost": summary, "joints": summary}
     rows["distributions"] = [
         {"controller": one["controller"], **pair}
         for one in evaluation["neighbours"]

@@ -27,10 +27,10 @@ and knee: N m, N m/rad, rad, N m s/rad, rad/s at the joint."""
 
 LOADS = (
     "hip_mean_square_torque", "knee_mean_square_torque", "hip_power", "knee_power", "least_power",
-    "hip_peak_speed", "knee_peak_speed", "stop_contact",
+    "hip_peak_speed", "knee_peak_speed", "stop_contact", "ground_force",
 )  # fmt: skip
-"""What a control period was for the motors: torque in (N m)^2 and mean mechanical power of each, W,
-least power of both together, W, highest speeds of the joints, rad/s, 1 if one was at its stop."""
+"""What a control period was for the leg: torque in (N m)^2 and mean power of each motor, W, least
+power of both, W, highest joint speeds, rad/s, 1 if one was at its stop, ground force at most, N."""
 
 MEMORY = np.dtype(
     [
@@ -115,8 +115,7 @@ def receive(memory: Record, inbox: Array, lane: int, now: float, dt: float) -> N
     t1, t2 = inbox[_MOTORS, lane], inbox[_MOTORS + 1, lane]
     w1, w2 = inbox[_MOTORS + 2, lane], inbox[_MOTORS + 3, lane]
     hip = knee = 0.0
-    rest = 1.0
-    arrived = 0
+    rest, arrived = 1.0, 0
     waiting = int(memory.waiting)
     while arrived < waiting and memory.pending[arrived, 0] < now + dt:
         share = min(max((memory.pending[arrived, 0] - now) / dt, 0.0) - (1 - rest), rest)
@@ -281,7 +280,7 @@ def advance(
     soft = (1.0 / stiff[0], 1.0 / stiff[1], 1.0 / stiff[2])
     rail = where(fixed, 0.0, p.rail_friction)
     rail_drag = where(fixed, 0.0, dt * p.rail_damping)
-    mean1 = mean2 = square1 = square2 = power1 = power2 = peak1 = peak2 = stop = zero
+    mean1 = mean2 = square1 = square2 = power1 = power2 = peak1 = peak2 = stop = most = zero
     least = spread(np.inf, push)
     t1, w1 = where(elastic1, t1, q1), where(elastic1, w1, v1)
     t2, w2 = where(elastic2, t2, q2), where(elastic2, w2, v2)
@@ -375,6 +374,8 @@ def advance(
         least = min(least, hip * w1 + knee * w2)
         peak1, peak2 = max(peak1, abs(v1)), max(peak2, abs(v2))
         stop = max(stop, max(stop1, stop2))
+        rubs, _ = physics.friction_slope(0, a, friction, physics.sliding(a, friction))
+        most = max(most, f0 + rubs - force0)
         if any_of(arrives):
             in_force = where(arrives, inbox.in_force, 1.0)
             hip = after_arrival(p, inbox.command, 0, in_force, hip, t1, w1)
@@ -401,7 +402,7 @@ def advance(
     loads = memory.loads
     loads[0], loads[1] = square1 / steps, square2 / steps
     loads[2], loads[3] = power1 / steps, power2 / steps
-    loads[4], loads[5], loads[6], loads[7] = least, peak1, peak2, stop
+    loads[4], loads[5], loads[6], loads[7], loads[8] = least, peak1, peak2, stop, most
 
 
 @compiled
