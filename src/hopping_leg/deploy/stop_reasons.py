@@ -217,9 +217,9 @@ def find_cause(
         ):
             if complaint:
                 return Cause(reason, f"{joint}: {complaint}")
-        reply = seen.replies[index]
-        if reply is not None and not reply.ahead <= limits.clock:
-            return Cause(Reason.DRIVE_CLOCK, f"{joint}: {reply.ahead * 1e3:.1f} ms gained")
+        told = seen.replies[index]
+        if told is not None and not told.ahead <= limits.clock:
+            return Cause(Reason.DRIVE_CLOCK, f"{joint}: {told.ahead * 1e3:.1f} ms gained")
         if now.excess[index] > limits.excess_ticks:
             return Cause(Reason.TORQUE_LIMIT, f"{joint}: limit {limits.torque[index]:g} N m")
         if now.missing[index] > limits.missing_ticks:
