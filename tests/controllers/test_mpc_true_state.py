@@ -15,8 +15,8 @@ from tests.controllers.measurements import hops_of
 HEIGHTS = np.linspace(0.22, 0.40, 10)
 ROBOT = load_robot("legv2-identified")
 SETTLED = 1.5
-STEP = 2.5e-4
-"""Physics step of the legs, a fourth of the planned one."""
+STEP = 2.5e-4  # Physics step of the legs, a fourth of the planned one, s
+RUBBING = replace_at(replace_at(ROBOT, "hip.friction", 1.5), "knee.friction", 1.5)
 
 
 def hop(robot, commands, legs=None):
@@ -70,10 +70,13 @@ def test_legs_that_differ_hop_as_high_each_on_any_number_of_threads(monkeypatch)
     np.testing.assert_array_equal(one.data["height_m"], other.data["height_m"])
 
 
-@pytest.mark.parametrize("drawn", [draw_twin(0), draw_twin(3), draw_leg(2)])
-def test_legs_of_any_size_and_twins_with_every_effect_hop_as_high(drawn):
-    heights = np.array([0.83, 1.07, 1.31]) * drawn.robot.straight_height
-    check_apexes(hop(drawn.robot, heights), heights)
+_DRAWN = [drawn.robot for drawn in (draw_twin(0), draw_twin(3), draw_leg(2))]
+
+
+@pytest.mark.parametrize("robot", [*_DRAWN, RUBBING])
+def test_legs_that_differ_or_rub_and_twins_with_every_effect_hop_as_high(robot):
+    heights = np.array([0.83, 1.07, 1.31]) * robot.straight_height
+    check_apexes(hop(robot, heights), heights)
 
 
 @pytest.mark.parametrize("latency", [0.0035, 0.012])

@@ -171,7 +171,7 @@ def test_a_policy_for_any_leg_acts_on_each_as_the_student_did():
 
 
 def test_a_push_counts_more_and_what_is_hidden_is_guessed():
-    made = learn(learner(TINY_UNIVERSAL), 16 * 32 * 4)
+    made = learn(learner(TINY_UNIVERSAL), 16 * 32 * 6)
     state = {k: np.asarray(v) for k, v in made._buffer.state().items()}
     config = TINY_UNIVERSAL.algorithm
     assert set(np.unique(state["weights"])) == {1.0, config.push_weight, config.fold_weight}

@@ -31,6 +31,7 @@ REST_SPEED = 0.1  # Speed of the hip on landing that counts as rest, m/s
 
 _STRETCHED = 0.97  # share of the stretched length at which a push ends in any case
 _FALL = 0.3  # force over the weight with which a leg sinks until it has to brake
+_SINKS = 0.6  # share of the weight that is left to a leg that stands, at least, for it to sink
 _LEAST_STROKE = 0.08  # of a landing, over the stretched length
 _LEAST_PUSH, _MOST_PUSH = 0.2, 14.0  # push-off force over the weight
 _REST = 0.02  # speed of the hip below which a landing ends, m/s
@@ -119,7 +120,11 @@ def law(p: Record, shape: Record, state: Array, hop: Record, phase: int, torque:
             way = max(state[0] - p.foot_radius - hop.squat, 0.01 * length)
             rate = min(state[3], 0.0)
             slowing = rate * rate / (2 * way)
-            force = (shape.fold if state[3] > -REST_SPEED else _FALL) * weight
+            force = _FALL * weight
+            if state[3] > -REST_SPEED:  # Joints that rub hold a leg that stands.
+                holds = p.friction[1] + p.stiction[1] + (p.friction[0] + p.stiction[0]) / 2
+                holds = holds / max(l2 * abs(s12), 0.01 * length) + p.rail_friction
+                force = min(shape.fold * weight, _SINKS * weight - holds)
             if slowing >= hop.stop:
                 force = weight * min(1 + slowing / p.gravity, shape.most_landing)
             leaning = 0.0

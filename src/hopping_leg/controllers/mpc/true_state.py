@@ -68,7 +68,7 @@ class HopShape:
     most_landing: float = 7.12
     """Largest force on landing."""
     fold: float = 0.3
-    """Force with which a leg that stands folds; a negative one pulls the hip down."""
+    """Force at most with which a leg that stands folds; a negative one pulls the hip down."""
     lean_from: float = 2.0
     """Push-off force beyond which the foot also pushes forward."""
     lean: float = 0.093
