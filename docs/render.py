@@ -77,18 +77,18 @@ def say(text: str) -> str:
     return _NUMBER.sub(filled, text)
 
 
-def precision(file: str, highest: float) -> str:
-    """Return how near hops come to commands up to the highest, m: a row per controller, in mm."""
-    from studies.evaluation.accuracy import LOWER, accuracies
+def precision(file: str) -> str:
+    """Return how near hops come to commands: a row per controller, lengths in mm."""
+    from studies.evaluation.accuracy import accuracies
 
     rows = []
-    for name, one in accuracies(read(file)["summary"], highest).items():
+    for name, one in accuracies(read(file)["summary"]).items():
         values = list(one.values())
-        cells = [*(1e3 * v for v in values[:5]), *values[5:8], *(100 * v for v in values[8:])]
+        cells = [*(1e3 * v for v in values[:4]), *values[4:7], *(100 * v for v in values[7:])]
         rows.append([name, *map(number, cells)])
     titles = [
-        "controller", "worst error, mm", "mean", f"worst std up to {LOWER} m", "of all",
-        "mean std", "skipped hops", "body contacts", "fewest hops/s", "least flight, %", "mean",
+        "controller", "worst error, mm", "mean", "worst std, mm", "mean", "skipped hops",
+        "body contacts", "fewest hops/s", "least flight, %", "mean",
     ]  # fmt: skip
     return grid(titles, rows) + _origin(file)
 

@@ -12,9 +12,8 @@ from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.energy_shaping import paper_energy_shaping, tuned_energy_shaping
 from hopping_leg.controllers.energy_shaping.controller import EnergyShaping, LiteralEnergyShaping
 from hopping_leg.controllers.energy_shaping.virtual_leg import LegView, Phase
-from hopping_leg.evaluate.metrics import ESTIMATED_APEX, START_SECONDS, HopWindow, measure
+from hopping_leg.evaluate.metrics import HopWindow, measure
 from hopping_leg.evaluate.result import summarise
-from hopping_leg.hop_detection import trace_hops
 from hopping_leg.io import plain
 from hopping_leg.robot import DEFAULT_ROBOT, TIMESTEP, Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, LegSimulator, NoiseAndDelay
@@ -156,12 +155,11 @@ class Baseline:
     def measure(self) -> Row:
         """Try every case, print a table, return every number.
 
-        ``cases`` has a record each, ``commands`` one per case and command, ``estimators`` the
-        errors of the apex estimates.
+        ``cases`` has a record each, ``commands`` one per case and command.
         """
         at_least(1, runs=self.runs)
         robot = load_robot(self.robot)
-        overall, single, estimators = [], [], []
+        overall, single = [], []
         for case in track(cases(robot), "hopping", transient=True):
             traces = self._hop(case)
             rows = [
@@ -170,8 +168,6 @@ class Baseline:
             ]
             overall.append(summary(case, rows))
             single += rows
-            if case.name in ("tuned", "paper"):
-                estimators += _estimators(case, traces)
         faults = ("skipped_hops", "body_contacts")
         show_rows(overall, "case", "mean_abs_median_error_m", "mean_std_m", "hop_rate_hz", *faults)
         return {
@@ -183,7 +179,6 @@ class Baseline:
             "timestep_s": TIMESTEP,
             "cases": overall,
             "commands": single,
-            "estimators": estimators,
         }
 
     def _hop(self, case: Case) -> list[Trace]:
@@ -218,34 +213,3 @@ def summary(case: Case, rows: Sequence[Row]) -> Row:
         "min_base_height_m": min(row["min_base_height_m"] for row in rows),
         "body_contacts": sum(row["body_contacts"] for row in rows),
     }
-
-
-def _apex_errors(trace: Trace, column: str) -> Array:
-    """Return estimated minus true apex of every hop that the controller noticed, m, (hops,).
-
-    A controller corrects its apex after touchdown: its next value after a true apex is that hop's.
-    """
-    estimate, hops = trace.column(column), trace_hops(trace)
-    ends = np.append(hops.tick, len(estimate))[1:]
-    settled = trace.column("time_s")[hops.tick] >= START_SECONDS
-    errors = []
-    for start, end, apex, counts in zip(hops.tick, ends, hops.apex, settled, strict=True):
-        changes = np.flatnonzero(np.diff(estimate[start:end]))
-        if counts and len(changes):
-            errors.append(estimate[start + changes[0] + 1] - apex)
-    return np.array(errors)
-
-
-def _estimators(case: Case, traces: Sequence[Trace]) -> list[Row]:
-    """Return the errors of the calibrated and of both raw apex estimates."""
-    columns = {
-        "as used": ESTIMATED_APEX,
-        "flight time": "flight_time_apex_m",
-        "ballistic": "ballistic_apex_m",
-    }
-    rows = []
-    for name, column in columns.items():
-        errors = np.concatenate([_apex_errors(trace, column) for trace in traces])
-        spread = {"mean_m": float(np.mean(errors)), "std_m": float(np.std(errors))}
-        rows.append({"case": case.name, "estimate": name, **spread, "hops": len(errors)})
-    return rows

@@ -5,32 +5,25 @@ from collections.abc import Iterable, Mapping
 from statistics import mean
 from typing import Any
 
-LOWER = 0.34
-"""Commands up to which less scatter is asked for, m."""
 
+def accuracies(rows: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, float]]:
+    """Return the accuracy of every controller of an evaluation's ``summary``, as JSON values.
 
-def accuracies(rows: Iterable[Mapping[str, Any]], highest: float) -> dict[str, dict[str, float]]:
-    """Return the accuracy of every controller of an evaluation, at commands up to ``highest``, m.
-
-    ``rows`` are its ``summary``, as JSON values. Errors are magnitudes of a command's median error,
-    stds those of its apexes, lower ones at commands up to ``LOWER``, lengths in m.
+    Errors are magnitudes of a command's median error, stds those of its apexes, m.
     """
     rows_of: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
-        if row["command_m"] <= highest:
-            rows_of.setdefault(row["controller"], []).append(row)
+        rows_of.setdefault(row["controller"], []).append(row)
     return {name: _accuracy(own) for name, own in rows_of.items()}
 
 
 def _accuracy(rows: list[Mapping[str, Any]]) -> dict[str, float]:
     errors = [abs(_known(row["median_error_m"])) for row in rows]
     spreads = [_known(row["std_m"]) for row in rows]
-    lower = [s for s, row in zip(spreads, rows, strict=True) if row["command_m"] <= LOWER]
     flights = [row["flight_fraction"] for row in rows]
     return {
         "worst_error_m": max(errors),
         "mean_error_m": mean(errors),
-        "lower_std_m": max(lower, default=0.0),
         "worst_std_m": max(spreads),
         "mean_std_m": mean(spreads),
         "skipped_hops": sum(row["skipped_hops"] for row in rows),
