@@ -33,11 +33,8 @@ Row = dict[str, Any]
 
 ROOT = Path(__file__).parent.parent
 
-LONGEST = 30
-"""Longest list of numbers in a stored result; what is longer is raw and stays with who measures."""
-
-NOT_SHOWN = ("groups", "ladder", "neighbours", "sequence")
-"""Parts of an evaluation at many heights that no page shows."""
+LONGEST = 30  # Numbers of a list in a stored result; what is longer is raw
+NOT_SHOWN = ("groups", "ladder", "neighbours", "sequence")  # Of an evaluation at many heights
 
 
 def main(

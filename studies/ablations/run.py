@@ -39,6 +39,10 @@ VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {
     ),
     "small": ("two layers of 64 and 64", {"hidden": (64, 64)}),
     "no-help": ("a student that hops alone from the start", {"mixing_share": 1e-9}),
+    "long-push": (
+        "a teacher that lifts off with a longer leg, so pushes longer with less force",
+        {"teacher.liftoff": 0.9, "teacher.liftoff_per_drop": 0.2, "teacher.least_push": 0.107},
+    ),
     "no-calibration": ("the command as it is", {"calibrations": 0}),
 }
 """By name: in words, and what is changed."""
@@ -52,7 +56,7 @@ class Ablation:
     """Names of those to train."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """One training of every variant each."""
-    steps: int = 500_000
+    steps: int = FAST.schedule.steps
     """Control steps of experience of each."""
     robot: RobotFile = DEFAULT_ROBOT
     out: Path = Path("runs/ablations")

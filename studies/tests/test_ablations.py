@@ -14,7 +14,7 @@ from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes.fast import FAST
 from studies.ablations import run as module
 from studies.ablations.run import VARIANTS, Ablation
-from studies.shared import main
+from studies.shared import ROOT, main
 
 ROLLOUT = TINY_FAST.algorithm.n_steps * TINY_FAST.schedule.num_envs
 
@@ -72,3 +72,9 @@ def test_a_variant_is_summed_up_over_seeds_its_worst_height_being_that_of_any():
     assert [first[key] for key in keys] == pytest.approx([0.003, 0.010, 0.005, 4])
     assert first["body_contact_ticks"] == 2
     assert second["runs"] == 1
+
+
+def test_a_longer_push_scatters_less_as_the_pages_say():
+    stored = json.loads((ROOT / "studies/ablations/results/ablations.json").read_text())
+    std = {row["variant"]: row["mean_std_m"] for row in stored["variants"]}
+    assert std["long-push"] < 0.85 * std["recipe"]

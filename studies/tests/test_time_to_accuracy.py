@@ -8,12 +8,14 @@ import pytest
 
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 
+import torch
 from tests.rl.learners import ROBOT, TINY, TINY_FAST, try_briefly
+from torch import nn
 
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.rl.policy_evaluation import CommandResult
+from studies.time_to_accuracy import libraries
 from studies.time_to_accuracy import run as module
-from studies.time_to_accuracy import sb3
 from studies.time_to_accuracy.run import TimeToAccuracy, over_commands, summarise
 
 SHORT = TINY_FAST.replace(steps=256)
@@ -56,13 +58,28 @@ def test_points_in_time_are_averaged_over_seeds_in_their_order():
 def test_snapshots_of_stable_baselines3_come_at_equal_times_until_the_minutes_are_over(monkeypatch):
     """On a clock of which every step of the environments takes a 64th of a second."""
     clock = itertools.count(5.0, 1 / 64)
-    monkeypatch.setattr(sb3, "time", SimpleNamespace(monotonic=lambda: next(clock)))
-    found = sb3.learn("sb3-ppo", ROBOT, 0, minutes=0.75 / 60, snapshots=3)
+    monkeypatch.setattr(libraries, "time", SimpleNamespace(process_time=lambda: next(clock)))
+    found = libraries.learn("sb3-ppo", ROBOT, 0, minutes=0.75 / 60, snapshots=3)
     assert [seconds for seconds, _, _ in found] == [0.25, 0.5, 0.75]
-    _, legs = sb3.ALGORITHMS["sb3-ppo"]
+    legs = libraries.ALGORITHMS["sb3-ppo"]
     assert [steps for _, steps, _ in found] == [16 * legs, 32 * legs, 48 * legs]
     for _, steps, content in found:
         assert Policy(content, "snapshot", "s").card.steps == steps
+
+
+@pytest.mark.parametrize("squashed", [False, True])
+def test_an_actor_of_sbx_is_taken_over_with_its_weights(squashed):
+    ends = (nn.ReLU(), nn.Tanh()) if squashed else (nn.Tanh(), nn.Identity())
+    expected = nn.Sequential(nn.Linear(15, 8), ends[0], nn.Linear(8, 2), ends[1])
+    weights = {name: value.detach().numpy().T for name, value in expected.named_parameters()}
+    dense = {
+        n: {"kernel": weights[f"{2 * n}.weight"], "bias": weights[f"{2 * n}.bias"]} for n in (0, 1)
+    }
+    state = SimpleNamespace(params={"params": {f"Dense_{n}": dense[n] for n in dense}})
+    actor = SimpleNamespace(net_arch=[8])
+    policy = SimpleNamespace(actor_state=state, actor=actor, squash_output=squashed)
+    found, seen = libraries.torch_actor(SimpleNamespace(policy=policy)), torch.rand(5, 15)
+    torch.testing.assert_close(found(seen), expected(seen))
 
 
 @pytest.fixture

@@ -89,8 +89,7 @@ def test_who_is_closer_is_as_the_pages_say():
     assert on["universal"]["closer_than_tuned"] < 0.5
     assert on["universal"]["median_std_m"] > on["energy-shaping-tuned"]["median_std_m"]
     error = {row["method"]: row["median_abs_error_m"] for row in noisy["methods"]}
-    least = ["energy-shaping-identified", "energy-shaping-tuned"]
-    assert sorted(error, key=error.get)[:2] == least
+    assert sorted(error, key=error.get)[:2] == ["energy-shaping-identified", "energy-shaping-tuned"]
     assert error["identified-belt"] < error["energy-shaping"]
     assert 0.8 < error["identified"] / error["cad"] < 1.2 < error["two-pass"] / error["cad"]
     assert error["universal"] == pytest.approx(error["universal-identified"], rel=0.1)

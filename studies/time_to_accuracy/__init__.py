@@ -9,7 +9,7 @@ RESULTS = (
             ("distillation", "fast", "0 1 2 3 4"),
             ("paper", "paper", "0 1 2 3 4"),
             ("paper_ppo", "paper-ppo paper-ppo-no-soft-limits", "0 1"),
-            ("stable_baselines3", "sb3-ppo sb3-sac", "1"),
+            ("libraries", "sb3-ppo sb3-sac sbx-ppo sbx-sac sbx-tqc", "0 1 2 3 4"),
             ("universal", "universal", "0 1 2"),
         )
     ),

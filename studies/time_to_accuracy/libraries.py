@@ -22,8 +22,7 @@ from hopping_leg.robot import Robot
 ALGORITHMS = {"sb3-ppo": 8, "sb3-sac": 1, "sbx-ppo": 8, "sbx-sac": 1, "sbx-tqc": 1}
 """Number of environments by name: that of the library and of its algorithm."""
 
-Snapshot = tuple[float, int, bytes]
-"""Seconds, control steps and the policy file as it stood."""
+Snapshot = tuple[float, int, bytes]  # Seconds, control steps, the policy file as it stood
 
 
 def learn(name: str, robot: Robot, seed: int, minutes: float, snapshots: int) -> list[Snapshot]:

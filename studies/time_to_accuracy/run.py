@@ -3,8 +3,8 @@
 A distillation is judged by its finished policy, and trained anew for every share of its steps,
 since its schedules end with them; of the others, which may be stopped at any time, snapshots of one
 training are judged. Times are whole: building the networks, evaluations and calibration are in
-them. All policies are judged on seeds that chose nothing, at the heights and on the robot that they
-were trained for.
+them. They are wall-clock times of two threads, for other libraries CPU times of one. All policies
+are judged on seeds that chose nothing, at the heights and on the robot that they were trained for.
 """
 
 import json
@@ -27,10 +27,9 @@ from hopping_leg.rl.run_folder import read_result
 from hopping_leg.rl.train import train
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
 from studies.shared import ROOT, Row, once, show_rows
-from studies.time_to_accuracy import sb3
+from studies.time_to_accuracy import libraries
 
-JUDGING_SEEDS = (1000, 1001)
-"""Seeds of noise and delay that chose nothing."""
+JUDGING_SEEDS = (1000, 1001)  # Of noise and delay; they chose nothing
 
 _PPO, _PAPER = RECIPES["rl"], RECIPES["paper"].replace(actor=(128, 128), eval_every=10**9)
 TRAINED = {
@@ -40,24 +39,23 @@ TRAINED = {
 TRAINED["paper-ppo-no-soft-limits"] = TRAINED["paper-ppo"].replace({"task.soft_limits": None})
 """Recipes, and another learner on the paper's reward: what that can reach."""
 
-SHARES = {"fast": (0.25, 0.5, 1.0)}
-"""Shares of the recipe's steps, for recipes whose schedules end with them."""
+SHARES = {"fast": (0.25, 0.5, 1.0)}  # Of the steps of recipes whose schedules end with them
 
 _SPACING = 0.02
 
 
 @dataclass(frozen=True)
 class TimeToAccuracy:
-    """Train recipes and stable-baselines3's algorithms from scratch; judge them over time."""
+    """Train recipes and other libraries' algorithms from scratch; judge them over time."""
 
-    recipes: tuple[str, ...] = ("rl", "fast", "paper", *sb3.ALGORITHMS)
-    """Recipes, paper-ppo, paper-ppo-no-soft-limits, sb3-ppo and sb3-sac."""
+    recipes: tuple[str, ...] = ("rl", "fast", "paper", *libraries.ALGORITHMS)
+    """Recipes, paper-ppo, paper-ppo-no-soft-limits, and algorithms as sb3-ppo, sbx-tqc."""
     seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
     """One training each."""
     robot: str | None = None
     """A shipped name or the path of a .toml file; by default each recipe's own."""
-    minutes: float = 6.0
-    """Time of stable-baselines3's algorithms."""
+    minutes: float = 5.0
+    """CPU time of each training of another library's algorithm."""
     out: Path = Path("runs/time_to_accuracy")
     """Where the trainings are kept: finished ones are not repeated, killed ones go on."""
     figure: Path | None = None
@@ -95,8 +93,8 @@ class TimeToAccuracy:
     def _train(self, recipe: str, seed: int) -> Row:
         """Train and judge; return rows over time, and what the last training spent time on."""
         robot = self._robot(recipe)
-        if recipe in sb3.ALGORITHMS:
-            found = sb3.learn(recipe, robot, seed, self.minutes, snapshots=12)
+        if recipe in libraries.ALGORITHMS:
+            found = libraries.learn(recipe, robot, seed, self.minutes, snapshots=12)
             rows = [{"seconds": s, "steps": n, **judge(content, robot)} for s, n, content in found]
             return {"rows": rows, "spent": {}}
         rows, result, whole = [], {}, TRAINED[recipe]
