@@ -188,18 +188,18 @@ def draw(rows: list[Row]) -> Figure:
     colours = controller_colours(row["recipe"] for row in rows)
     keys = ("mean_abs_median_error_m", "mean_std_m")
     for (axis,), key, title in zip(axes, keys, ("mean |error| / mm", "mean std / mm"), strict=True):
-        for name, colour in colours.items():
+        for mark, (name, colour) in zip("os^vDP*Xd<>" * 2, colours.items(), strict=False):
             own = [row for row in rows if row["recipe"] == name]
             for number, seed in enumerate(dict.fromkeys(row["seed"] for row in own)):
                 line = [row for row in own if row["seed"] == seed]
                 label = name if number == 0 else None
                 seconds = [row["seconds"] for row in line]
                 shown = [1e3 * row[key] or np.nan for row in line]
-                axis.plot(seconds, shown, ".-", color=colour, lw=0.8, label=label)
+                axis.plot(seconds, shown, f"{mark}-", color=colour, lw=0.6, ms=3, label=label)
         axis.set(xscale="log", yscale="log", ylim=(0.2, 500))
         for side in (axis.xaxis, axis.yaxis):
             side.set_major_formatter("{x:g}")
         axis.set_ylabel(title)
-    axes[0][0].legend(ncol=2)
-    axes[-1][0].set_xlabel("wall-clock time / s")
+    axes[0][0].legend(ncol=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    axes[-1][0].set_xlabel("time / s")
     return figure
