@@ -56,10 +56,10 @@ class Reason(IntEnum):
     CONTROLLER_SLOW = 28, "The controller took too much of a control period."
 
 
-_DRIFT_SECONDS = 0.5  # Time after which a drift is forgotten
+_DRIFT_SECONDS = 1.0  # Time after which a drift is forgotten
+_DRIFT_SPEED = 2.0  # rad/s; what is faster counts as that while a joint is shaken
 _GAP = 1.5  # Periods between two replies beyond which velocities no longer tell the way between
-_VELOCITY_AGE = 3e-3  # s by which drives filter it, as leg V2's hops on its boom show
-_DRIFT_MOST = 0.2  # rad, at any speed
+_IMPACT = 3.0  # Change of speed between two replies beyond which they do not, rad/s
 
 _ON_TIME = 0.2
 """Of a late tick that one in time makes up for: one late tick in six is tolerated for ever."""
@@ -168,12 +168,16 @@ class Counts:
         return known.after(limits.motors[index], self.last[index], reply, told[index])
 
     def _drifted(self, index: int, limits: SafetyLimits, reply: Reply | None) -> float:
-        """Return a drive's drift with a reply; across a gap it is unknown."""
+        """Return a drive's drift with a reply; across a gap or an impact it is unknown."""
         last, drift = self.last[index], self.drift[index]
-        elapsed = reply.taken - last.taken if reply and last else 0.0
-        if reply is None or last is None or not 0 < elapsed < _GAP * limits.period:
+        if reply is None or last is None or abs(reply.velocity - last.velocity) > _IMPACT:
             return drift
-        return drift * math.exp(-elapsed / _DRIFT_SECONDS) + _unexplained(last, reply)
+        elapsed = reply.taken - last.taken
+        if not 0 < elapsed < _GAP * limits.period:
+            return drift
+        most = _DRIFT_SPEED * elapsed if self.evidence[index].shaken > _IMPACT else math.inf
+        gained = max(-most, min(most, _unexplained(last, reply)))
+        return drift * math.exp(-elapsed / _DRIFT_SECONDS) + gained
 
     def _of_drive(
         self, index: int, limits: SafetyLimits, reply: Reply | None
@@ -206,8 +210,7 @@ def find_cause(
         if found is not None:
             return Cause(found.reason, f"{JOINTS[index]}: {found.detail}")
     for index, joint in enumerate(JOINTS):
-        filtered = _VELOCITY_AGE * abs(last.velocity) if (last := now.last[index]) else 0.0
-        if not abs(now.drift[index]) <= min(limits.drift + filtered, _DRIFT_MOST):
+        if not abs(now.drift[index]) <= limits.drift:
             return Cause(Reason.ENCODER_DRIFT, f"{joint}: {abs(now.drift[index]):.3g} rad off")
         evidence = now.evidence[index]
         for reason, complaint in (
