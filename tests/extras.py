@@ -3,8 +3,7 @@
 import subprocess
 import sys
 
-TRAINING = ("torch", "stable_baselines3", "onnx", "tensorboard")
-"""Packages of the extra `train`."""
+TRAINING = ("torch", "stable_baselines3", "onnx", "tensorboard")  # Packages of the extra `train`
 
 _BLOCK = """
 import sys

@@ -44,8 +44,7 @@ pytest.importorskip("viser")
 from tests.rl.learners import try_briefly
 
 RUNNABLE = [page for page in PAGES if any(b.language in ("bash", "python") for b in blocks(page))]
-WITH_KINDS = ("record", "export", "robots")
-"""Verbs whose options depend on the next word."""
+WITH_KINDS = ("record", "export", "robots")  # Verbs whose options depend on the next word
 
 
 @functools.cache

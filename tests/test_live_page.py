@@ -104,8 +104,7 @@ def test_changed_legs_and_their_ticks_in_air_and_contact_are_those_of_the_packag
     np.testing.assert_allclose(found[0], legs.state, rtol=1e-12, atol=1e-12)
 
 
-TICKS = 300
-"""Of a run, 1.5 s: three or four hops."""
+TICKS = 300  # Of a run, 1.5 s: three or four hops
 
 RUN = """
 const [name, robotName, command, noise, ticks, channel, sensors, jitter, bytes] = argument;

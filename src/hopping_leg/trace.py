@@ -67,7 +67,7 @@ def _reader() -> subprocess.Popen[bytes]:
 def read_parquet(content: bytes, origin: str, error: Error) -> tuple[pl.DataFrame, dict[str, str]]:
     """Return a Parquet file's table and metadata; ``error`` says that it is damaged.
 
-    It is read elsewhere first: a damaged one may end the process that reads it.
+    Another process reads it first: polars may end the one that reads a damaged file.
     """
     reader = _reader()
     with contextlib.suppress(pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError):

@@ -21,8 +21,7 @@ from hopping_leg.flight_recording import recover
 from hopping_leg.trace import Trace
 
 pytestmark = pytest.mark.slow
-BEGUN = 40
-"""Rows in the black box after which a run counts as begun."""
+BEGUN = 40  # Rows in the black box after which a run counts as begun
 
 
 @pytest.fixture

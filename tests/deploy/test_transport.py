@@ -21,8 +21,7 @@ from hopping_leg.emulator.ports import LineProtocol
 from hopping_leg.errors import HardwareError
 from tests.emulator.bench import Bench
 
-WAIT = 2.0
-"""Longest wait for replies, s: generous, as machines that run tests are slow."""
+WAIT = 2.0  # Longest wait for replies, s: generous, as machines that run tests are slow
 
 
 @pytest.fixture

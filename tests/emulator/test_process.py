@@ -15,8 +15,7 @@ from hopping_leg.emulator.server import EmulatorConfig, Server
 from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import UsageError
 
-PATIENT = 1.0
-"""Watchdog of the tests, s: this machine may be busy."""
+PATIENT = 1.0  # Watchdog of the tests, s: this machine may be busy
 
 TORQUE = {"position": math.nan, "kp_scale": 0.0, "kd_scale": 0.0, "watchdog_timeout": PATIENT}
 

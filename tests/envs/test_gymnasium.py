@@ -21,8 +21,7 @@ RANDOM = TaskConfig(
     episode=0.1, observation="dated", reset_distribution="mixed", command_range=(0.22, 0.4),
     command_resampling_time=(0.02, 0.05), randomised=WIDE_RANGES,
 )  # fmt: skip
-APEX = apex_reward(load_robot(DEFAULT_ROBOT), ApexRewardConfig(), 200.0)
-"""A reward that remembers."""
+APEX = apex_reward(load_robot(DEFAULT_ROBOT), ApexRewardConfig(), 200.0)  # A reward that remembers
 SINGLE, VECTOR, SYNC = "single", "vector_entry_point", "sync"
 MODES = [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP]
 KINDS = [SINGLE, VECTOR, SYNC, pytest.param("async", marks=pytest.mark.slow)]

@@ -153,8 +153,9 @@ def test_the_interval_is_over_realisations_not_over_trials():
 
 
 def test_rows_tell_levels():
+    good = pl.concat([rows(0.1, True), rows(0.1, True, error_m=0.01)])
     bad = [rows(0.2, False, error_m=-0.05, contacts=3), rows(0.2, False, error_m=-0.09, skipped=4)]
-    levels = robustness.level_rows("mine", "delay", pl.concat([*bad, rows(0.1, True)]))
+    levels = robustness.level_rows("mine", "delay", pl.concat([*bad, good]))
     assert [(row["level"], row["success"]) for row in levels] == [(0.1, 1.0), (0.2, 0.0)]
     assert levels[1]["median_abs_error_m"] == pytest.approx(0.07)
     assert (levels[1]["skipped_hops"], levels[1]["body_contacts"]) == (4, 3)

@@ -6,8 +6,13 @@ from scipy import stats
 
 from hopping_leg.evaluate import statistics
 from hopping_leg.evaluate.metrics import errors_of
-from hopping_leg.evaluate.statistics import compare, median_interval
+from hopping_leg.evaluate.statistics import cliffs_delta, compare, median_interval
 from tests.evaluate.test_metrics import sine_trace, window_of
+
+
+def test_cliffs_delta_counts_pairs():
+    lower, upper = np.array([1.0, 2.0, 4.0]), np.array([2.0, 3.0])
+    assert cliffs_delta(lower, upper) == pytest.approx((3 - 2) / 6)  # one pair is tied
 
 
 def test_runs_with_offsets_of_their_own_are_not_taken_for_one_sample():

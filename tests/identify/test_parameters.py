@@ -90,8 +90,7 @@ def test_what_the_data_do_not_touch_is_said():
     assert "These data say nothing about 'knee.friction'." in known.statements
 
 
-HERE = np.zeros((1, 2))
-"""The CAD's values among vectors of two parameters."""
+HERE = np.zeros((1, 2))  # The CAD's values among vectors of two parameters
 
 
 def test_the_paper_cost_is_the_sum_of_squared_position_errors():

@@ -13,10 +13,8 @@ from hopping_leg.identify.recording import make_recording
 from hopping_leg.identify.recording_format import PAIRS, RecordingMetadata
 from hopping_leg.robot import MotorLimit, get_spec, kinematics, load_robot
 
-STEP = 1e-3
-"""Physics step of the fits."""
-FINE = STEP / 4
-"""Physics step of the recordings, by Runge-Kutta's method."""
+STEP = 1e-3  # Physics step of the fits
+FINE = STEP / 4  # Physics step of the recordings, by Runge-Kutta's method
 LEG = load_robot("legv2")
 GAINS = {"stiffness": (8.0, 8.0), "damping": (0.3, 0.3)}
 

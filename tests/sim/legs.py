@@ -11,8 +11,7 @@ from hopping_leg.sim import LegSimulator
 
 POSTURE = np.array([0.7, -1.4])
 
-STEP = 5e-4
-"""Physics step of these tests, s, unless they are about it."""
+STEP = 5e-4  # Physics step of these tests, s, unless they are about it
 
 
 def make_legs(robot, count=1, **options):

@@ -157,6 +157,15 @@ def passed(one, ticks):
     return [np.stack(values) for values in zip(*seen, strict=True)]
 
 
+def test_a_restarted_leg_has_no_past():
+    noisy = channel(2, QUIET)
+    passed(noisy, range(25))
+    noisy.restart(np.array([1]), *at(100, 1))
+    seen = seen_by(noisy, *at(100, 2))
+    assert (seen.q[1] == 100).all()
+    assert (seen.q[0, 1:] < 100).all()
+
+
 @pytest.mark.parametrize("ticks", [3, 511, 512, 700])
 def test_a_restored_channel_goes_on_exactly(ticks):
     one, other = channel(2, NoiseAndDelay(), 1), channel(2, NoiseAndDelay(), 2)

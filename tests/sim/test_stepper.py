@@ -183,8 +183,7 @@ ELASTIC = {
 }
 
 
-BOOM = {"boom": Boom(1e9, 0.0, 0.3, 0.8, 0.6, -4.0, 0.0, 0.5, 1.0)}
-"""Its arc is a straight line."""
+BOOM = {"boom": Boom(1e9, 0.0, 0.3, 0.8, 0.6, -4.0, 0.0, 0.5, 1.0)}  # Its arc is a straight line
 
 
 @pytest.mark.parametrize(

@@ -138,8 +138,8 @@ def _import(args: Import) -> None:
     say(*comment.splitlines())
     for path, entry in numbers(tree):
         if (why := entry["source"]).startswith("assumed: "):
-            said = f"Assumed: {path} = {entry['value']:g} {entry['unit']} ({why[9:]})"
-            say(said.replace(" 1 (", " (", 1))
+            unit = f" {entry['unit']}".removesuffix(" 1")
+            say(f"Assumed: {path} = {entry['value']:g}{unit} ({why[9:]})")
     say(f"Wrote {out}: {robot.name} ({_summary(robot)}).")
     say(*(f"But {doubt}" for doubt in [*leg.doubts, *robot_files.doubts(out)]))
 
