@@ -1,6 +1,7 @@
 # `make reproduce` and `make test` set up .venv by themselves; `make help` lists everything.
 
-PYTHON ?= python3.11
+PYTHON ?= $(shell for python in python3.11 python3.12 python3.13 python3.14 python3; do \
+  $$python -c 'import ensurepip, venv' 2>/dev/null && break; done; echo $$python)
 BIN := .venv/bin
 STAMP := .venv/.complete
 PIP := $(BIN)/python -m pip --disable-pip-version-check
@@ -19,8 +20,8 @@ install: $(STAMP)
 # torch comes first and alone: it is by far the largest, and its index may differ from the rest's.
 $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys, ensurepip, venv; sys.exit(sys.version_info < (3, 11))' || { \
-	  echo "Python 3.11 or newer with venv is needed as $(PYTHON) (Debian: apt install python3.11-venv);" \
-	       "name another with 'make PYTHON=python3'." >&2; exit 1; }
+	  echo "Python 3.11 or newer with venv is needed as $(PYTHON) (Debian: apt install python3-venv);" \
+	       "name another with 'make PYTHON=PATH'." >&2; exit 1; }
 	$(PYTHON) -m venv .venv
 	$(PIP) install $$(grep '^torch==' constraints.txt)
 	$(PIP) install -c constraints.txt hatchling editables

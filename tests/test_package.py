@@ -45,13 +45,22 @@ def test_the_source_archive_holds_what_is_installed_and_read_nothing_large_and_n
 def test_the_container_is_built_by_the_commands_of_the_readme():
     lines = (ROOT / "Dockerfile").read_text().replace("\\\n", "").splitlines()
     commands = [line.removeprefix("RUN ") for line in lines if line.startswith("RUN ")]
-    system, *commands = commands
+    system, command = commands
     assert {"python3.11-venv", "make", "git"} <= set(system.split())
-    readme = (ROOT / "README.md").read_text()
-    assert commands
-    assert all(command in readme for command in commands)
+    assert command in (ROOT / "README.md").read_text()
     (call,) = [json.loads(line.removeprefix("CMD ")) for line in lines if line.startswith("CMD ")]
     assert not read_options(View, "hop demo", None, call[1:]).browser
+
+
+def test_metadata_pages_and_what_tries_the_wheel_name_the_same_pythons():
+    words = [text.split(" :: ") for text in PROJECT["classifiers"]]
+    first, *others, last = names = [name for *_, language, name in words if language == "Python"]
+    assert PROJECT["requires-python"] == f">={first}"
+    commands = " ".join(f"python{name}" for name in names)
+    said = {"README.md": f"Python {first} to {last} ", "Makefile": commands}
+    said[".ci/wheel.sh"] = f" {commands}; do"
+    said["docs/index.md"] = f"Python {', '.join([first, *others])} and {last}"
+    assert [file for file, text in said.items() if text not in (ROOT / file).read_text()] == []
 
 
 def test_the_installed_version_is_that_of_project_changelog_and_citation_and_pins_no_other():
