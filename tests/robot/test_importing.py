@@ -193,6 +193,9 @@ def test_a_urdfs_mesh_without_inertial_weighs_nothing(tmp_path):
     leg = imported(tmp_path / "leg.urdf", text)
     assert (leg.base.mass, leg.thigh.mass, leg.shank.mass) == pytest.approx((0.91, 0.795, 0.148))
     assert (leg.thigh.length, leg.shank.length, leg.foot.radius) == (0.17, 0.165, 0.014)
+    (tmp_path / "leg.urdf").write_text(text.replace("prismatic", "fixed").replace("stand", "world"))
+    free = read_leg(tmp_path / "leg.urdf")
+    assert (free.doubts, len(free.notes), free.notes[2][:17]) == ([], 3, "No vertical slide")
 
 
 def test_what_a_file_hardly_means_is_doubted(tmp_path):
@@ -203,10 +206,14 @@ def test_what_a_file_hardly_means_is_doubted(tmp_path):
     weightless, far = read_leg(file).doubts
     assert "'carriage' weighs nothing" in weightless
     assert "'knee_pitch' ends at 0 and 143 rad: in degrees?" in far
+    file.write_text(EXAMPLE.replace('lower="0" upper="2.5"', 'lower="2.5" upper="0"'))
+    assert "ends at 2.5 and 0 rad: taken in order." in read_leg(file).doubts[0]
+    assert read_leg(file).numbers["knee.stop_lower"][0] == -2.5
 
 
 def test_joints_that_are_not_the_legs_are_held_and_named(tmp_path):
     path = tmp_path / "leg.urdf"
     path.write_text(LEG.replace('name="foot_tip" type="fixed"', 'name="ankle" type="continuous"'))
     leg = read_leg(path, "hip", "knee", "foot")
-    assert leg.notes[2:] == ["Joints held in the zero posture: ankle."]
+    assert "side is a guess" in leg.notes[2], "nothing tells where the straight leg's knee bends"
+    assert leg.notes[3:] == ["Joints held in the zero posture: ankle."]

@@ -59,9 +59,7 @@ def test_numbers_that_belong_to_a_changed_one_are_named_until_stated(tmp_path, p
     assert all(word in sentence for word in (file, path, "legv2-paper", *belong))
     entries = dict(numbers(load_tree(file)))
     named = sentence.split(" but not ")[1].split(", inherited")[0].split(", ")
-    stated = {
-        name: (entries[name]["value"], entries[name]["unit"]) for name in named if name in entries
-    }
+    stated = {n: (entries[n]["value"], entries[n]["unit"]) for n in named if n in entries}
     stated.setdefault("knee.armature", (0.01, "kg m2"))
     assert doubts(written(tmp_path / "leg.toml", {path: value, **stated})) == []
 
@@ -107,6 +105,8 @@ def test_a_leg_too_heavy_for_its_motors_is_doubted_with_the_torque_that_standing
     needed = float(doubt.partition("takes ")[2].split()[0])
     assert needed == pytest.approx(20.9 * 9.81 * lever, rel=0.1)
     assert "its torque limit is 20 N m" in doubt
+    (drag,) = doubts(written(tmp_path / "leg.toml", {"knee.damping": (9.0, "N m s/rad")}))
+    assert "'knee.damping' is 9, which hardly fits" in drag
 
 
 def test_a_weight_beyond_a_links_end_needs_a_word(tmp_path):

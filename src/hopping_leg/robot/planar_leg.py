@@ -71,14 +71,13 @@ def read_leg(
     tree = Description(path)
     data, body_of = tree.data, tree.model.jnt_bodyid
     upper, lower = joints = _hip_and_knee(tree, hip, knee)
-    slides = tree.above(upper, _SLIDE)
-    vertical = (i for i in slides if abs(data.xaxis[i] @ tree.up) > 1 - _PARALLEL)
-    rail = next(vertical, None)
+    rails = (i for i in tree.above(upper, _SLIDE) if abs(data.xaxis[i] @ tree.up) > 1 - _PARALLEL)
+    rail = next(rails, None)
     moving = tree.subtree(0 if rail is None else body_of[rail])
     leg, shank = (tree.subtree(body_of[joint]) for joint in joints)
     tip = _foot(tree, foot, shank, lower, shank_length)
     ends = np.stack([data.xanchor[upper], data.xanchor[lower], tip.position])
-    normal, flat = _plane(tree, joints, ends)
+    normal, flat, told = _plane(tree, joints, ends)
     lines = np.diff(ends, axis=0) @ flat.T
     thigh, direction = np.arctan2(lines[:, 1], lines[:, 0])
     found = {"rail": {} if rail is None else _stated(tree, rail), "base": {}}
@@ -96,6 +95,8 @@ def read_leg(
     hinges = (i for i in range(tree.model.njnt) if body_of[i] in moving)
     held = ", ".join(tree.joint(i) for i in hinges if i not in (*joints, rail))
     notes = [f"  hip = {hip_angle}", f"  knee = {knee_angle}"]
+    notes += [] if told else ["The knee's side is a guess: both signs may be the other ones."]
+    notes += ["No vertical slide: the base is all but the leg."] if rail is None else []
     notes += [f"The foot is {tip.name}."] if tip.name == _THROUGH else []
     notes += [f"{tree.loops} equality constraints are left out."] if tree.loops else []
     notes += [f"Joints held in the zero posture: {held}."] if held else []
@@ -105,11 +106,10 @@ def read_leg(
         for key, (value, source) in entries.items()
         if value > 0 or "stop" in key
     }
-    doubts = [f"'{tree.body(i)}' weighs nothing." for i in sorted(tree.weightless & moving)]
-    far = (
-        (i, *tree.model.jnt_range[i]) for i in joints if abs(tree.model.jnt_range[i]).max() > _TURN
-    )
-    doubts += [f"'{tree.joint(i)}' ends at {a:g} and {b:g} rad: in degrees?" for i, a, b in far]
+    doubts = [f"'{tree.body(i)}' weighs nothing." for i in sorted(tree.weightless & moving - {0})]
+    for i, (low, high) in zip(joints, tree.model.jnt_range[[upper, lower]], strict=True):
+        odd = "in degrees?" if max(-low, high) > _TURN else "taken in order." if low > high else ""
+        doubts += [f"'{tree.joint(i)}' ends at {low:g} and {high:g} rad: {odd}"] if odd else []
     return PlanarLeg(tree.name, numbers, notes, [f"{tree.origin}: {doubt}" for doubt in doubts])
 
 
@@ -194,10 +194,10 @@ def _aside(tree: Description, joint: int, vector: Array) -> float:
     return float(np.linalg.norm(np.cross(vector, tree.data.xaxis[joint])))
 
 
-def _plane(tree: Description, joints: tuple[int, int], ends: Array) -> tuple[Array, Array]:
+def _plane(tree: Description, joints: tuple[int, int], ends: Array) -> tuple[Array, Array, bool]:
     """Return the axis about which positive turns swing forward, and down and forward as rows.
 
-    Of the two ways forward it is that to which the knee sticks out.
+    Of the two ways forward it is that to which the knee sticks out; last, whether the file tells.
     """
     axis = tree.data.xaxis[joints[0]]
     level = axis - (axis @ tree.up) * tree.up
@@ -215,7 +215,7 @@ def _plane(tree: Description, joints: tuple[int, int], ends: Array) -> tuple[Arr
         bend = middle if abs(middle) > _BENT else bend
     if bend > _BENT:
         normal, forward = -normal, -forward
-    return normal, np.stack([-tree.up, forward])
+    return normal, np.stack([-tree.up, forward]), abs(bend) > _BENT
 
 
 def _wrapped(angle: float) -> float:
@@ -225,9 +225,10 @@ def _wrapped(angle: float) -> float:
 
 def _stops(tree: Description, joint: int) -> tuple[float, float] | None:
     """Return where a joint ends against the zero posture, rad, None if nowhere within a turn."""
-    low, high = (float(end) - tree.zero(joint) for end in tree.model.jnt_range[joint])
-    limited = tree.model.jnt_limited[joint] and -_TURN <= low < high <= _TURN
-    return (low, high) if limited else None
+    ends = tree.model.jnt_range[joint]
+    low, high = np.sort(ends) - tree.zero(joint)
+    limited = (tree.model.jnt_limited[joint] or ends[0] > ends[1]) and -_TURN <= low < high <= _TURN
+    return (float(low), float(high)) if limited else None
 
 
 def _stated(tree: Description, joint: int) -> dict[str, Entry]:

@@ -95,7 +95,8 @@ def _usual(robot: Robot) -> Iterator[tuple[str, float, float]]:
         yield f"{name}.inertia", 0.002 * whole, whole
     for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
         most, gear = robot.mass * size**2, (joint.motor.gear_ratio * joint.belt_ratio) ** 2
-        yield f"{name}.friction", 0, joint.torque_limit
+        yield f"{name}.friction", 0, joint.torque_limit / 2
+        yield f"{name}.damping", 0, joint.torque_limit / math.sqrt(GRAVITY / size)
         yield f"{name}.motor.rotor_inertia", 0, most / gear
         yield f"{name}.armature", 0, most
 

@@ -190,6 +190,5 @@ class TrueStateMpc:
 def _rigid(robot: Robot) -> Robot:
     """Return a robot without elastic transmissions, whose springs need a finer physics step."""
     reality = robot.reality
-    hip = replace(reality.hip, stiffness=None, backlash=0.0)
-    knee = replace(reality.knee, stiffness=None, backlash=0.0)
+    hip, knee = (replace(j, stiffness=None, backlash=0.0) for j in (reality.hip, reality.knee))
     return replace(robot, reality=replace(reality, hip=hip, knee=knee))
