@@ -138,7 +138,7 @@ def test_a_boom_is_described_and_only_a_boom():
 @needs_recordings
 def test_the_labs_folder_is_read_as_it_is():
     """Signs, torques behind the belt, and a height that closes the standing leg's kinematics."""
-    recording = load_recording(RECORDINGS / "legv2_boom_200hz" / "static")
+    recording = load_recording(RECORDINGS / "legv2_boom_200hz" / "static" / "stateData.csv.gz")
     assert recording.metadata.rate_hz == 200.0
     found = hops.flights(recording, CAD)
     assert len(found) >= 10

@@ -37,9 +37,8 @@ def test_an_angle_that_wraps_goes_on(speed, start, side):
         hip_position_command_rad=true,
     )
     recording = load(table, **PENDULUM)
-    assert any("wraps" in warning for warning in recording.warnings) == (
-        np.ptp(np.floor((true + np.pi) / (2 * np.pi))) > 0
-    )
+    wraps = np.ptp(np.floor((true + np.pi) / (2 * np.pi))) > 0
+    assert any("wraps" in warning for warning in recording.warnings) == wraps
     shown = recording.array("position")[:, 0]
     np.testing.assert_allclose(shown - shown[0], true - true[0], atol=1e-9)
     assert recording.has("velocity"), "it is the derivative"
@@ -58,8 +57,7 @@ def test_spikes_are_left_out_and_nothing_else(rows, length, size, side):
     values = swinging()[HIP].to_numpy().copy()
     values[hit] += side * size
     recording = load(swinging().with_columns(hip_position_rad=values))
-    (warning,) = recording.warnings
-    assert "spikes" in warning or "wraps" in warning
+    assert ["spikes" in w or "wraps" in w for w in recording.warnings] == [True]
     shown = recording.array("position")[:, 0]
     kept = np.setdiff1d(np.arange(600), hit)
     np.testing.assert_array_equal(shown[kept], swinging()[HIP].to_numpy()[kept])
@@ -78,8 +76,7 @@ def test_a_counter_that_wraps_goes_on(bits, unit, start, jitter):
     rng = np.random.default_rng(0)
     true = (1 + 3 // period) * period - start + np.arange(600) / 200 + jitter * rng.random(600)
     recording = clocked(true % period)
-    (warning,) = recording.warnings
-    assert "began anew" in warning
+    assert ["began anew" in warning for warning in recording.warnings] == [True]
     np.testing.assert_allclose(recording.time - recording.time[0], true - true[0], atol=1e-9)
 
 
@@ -101,14 +98,12 @@ def test_a_joint_of_another_sign_is_refused_where_the_leg_stands(joint):
     with pytest.raises(RecordingError, match="change the sign of one of the joints"):
         load(table.with_columns(flipped), rig="rail")
     both = [-pl.col(name) for pair in ("position", "velocity") for name in PAIRS[pair]]
-    assert load(table.with_columns(both), rig="rail").warnings == ()
+    assert "a mirrored 'legv2' stands" in load(table.with_columns(both), rig="rail").warnings[0]
 
 
 def test_a_fine_clock_a_whole_period_or_jitter_is_believed():
-    time = np.arange(600) / 200
-    rng = np.random.default_rng(0)
-    assert clocked(np.round(time, 3)).warnings == ()
-    assert clocked(time + rng.uniform(-1e-3, 1e-3, 600)).warnings == ()
+    time, jitter = np.arange(600) / 200, np.random.default_rng(0).uniform(-1e-3, 1e-3, 600)
+    assert clocked(np.round(time, 3)).warnings == clocked(time + jitter).warnings == ()
 
 
 JOINTS = st.sampled_from([0, 1])
@@ -130,8 +125,7 @@ def test_rows_that_are_late_or_early_are_named(late):
     table = tracked().trace.table.with_columns(pl.col(PAIRS["torque"]).shift(late))
     says = f"follows the stated PD {'early' if late < 0 else 'late'}, by .* {abs(late)} of its rows"
     if 0 < late < 4:
-        assert all(says.split(" by ")[0] in warning for warning in driven(table).warnings)
-        assert len(driven(table).warnings) == 2
+        assert [says.split(" by ")[0] in w for w in driven(table).warnings] == [True, True]
     else:
         with pytest.raises(RecordingError, match=says):
             driven(table)

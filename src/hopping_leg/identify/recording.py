@@ -131,6 +131,7 @@ def load_recording(path: str | Path) -> Recording:
     RecordingError says which file, column and row cannot be read or believed.
     """
     path = Path(path)
+    path = path.parent if path.name.partition(".")[0] in importers.LAB_FILES else path
     origin, sidecar = str(path), sidecar_path(path)
     table, header, digest = _read(path, origin)
     if sidecar != path and sidecar.is_file():
@@ -174,6 +175,8 @@ def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
     try:
         if content.startswith(_GZIP):
             content = gzip.decompress(content)
+        if b"\0" in content:
+            raise OSError("it holds zero bytes, as UTF-16, archives and torn files do")
         unquoted = re.sub(rb'"[^"\n]*"', b"", content.removeprefix(b"\xef\xbb\xbf"))
         lines = [n for n in unquoted.splitlines() if n.strip() and n[:1] != b"#"]
         mark = next((m for m in b"\t;" if m in b"".join(lines[:1])), ord(","))

@@ -98,6 +98,7 @@ _SPARSEST = 20.0  # periods per row beyond which the rate or the time's unit mus
 # Where counters of nanoseconds to seconds begin anew, and the time of day, s
 _COUNTERS = [2.0**bits * 10.0**-n for bits in (16, 24, 31, 32) for n in (9, 6, 3, 0)] + [86400.0]
 _SOON = 5.0  # usual steps within which a wrapped clock goes on
+_UNSORTED = 0.4  # share of steps back in time that no counter makes
 _ALIKE = 0.01  # periods within which two steps are one
 _COARSE = 0.3  # periods that a clock's tick may last
 
@@ -114,6 +115,8 @@ def _check_clock(inspection: Inspection) -> None:
     time = inspection.floats("time_s")
     if len(bad := np.flatnonzero(~np.isfinite(time))):
         inspection.refuse(f"column 'time_s' has no time in row {inspection.row(bad[0])}")
+    if np.sum(np.diff(time) < 0) > _UNSORTED * len(time):
+        inspection.refuse("its rows are not in the order of time; sort them by column 'time_s'")
     _unwrap_time(inspection, time)
     steps, metadata = np.diff(time), inspection.metadata
     if not len(steps):
@@ -128,7 +131,7 @@ def _check_clock(inspection: Inspection) -> None:
         before, after = time[back[0] : back[0] + 2]
         inspection.refuse(
             f"column 'time_s' does not increase in row {inspection.row(back[0] + 1)}:"
-            f" {after:.9g} s comes after {before:.9g} s; split the file there"
+            f" {after:.9g} s comes after {before:.9g} s; delete that row, or split the file there"
         )
     step = float(np.median(steps))
     if not 0.5 <= step * metadata.rate_hz <= _SPARSEST:
@@ -314,17 +317,20 @@ def _check_jumps(inspection: Inspection) -> None:
 
 
 def _check_signs(inspection: Inspection) -> None:
-    """Refuse a standing leg one of whose joints has another sign; a mirrored leg is as good."""
+    """Refuse a standing leg one of whose joints has another sign; doubt a mirrored one."""
     robot, columns = inspection.robot, PAIRS["position"]
     if robot is None or inspection.metadata.rig == "fixed-base":
         return
     about = [float(np.nanmedian([*inspection.floats(c), np.nan])) for c in columns]
-    if np.prod(np.sign([*about, *(j.lower + j.upper for j in (robot.hip, robot.knee))])) < 0:
+    signs = np.sign(about) * np.sign([j.lower + j.upper for j in (robot.hip, robot.knee)])
+    said = f"columns {' and '.join(columns)} are about {about[0]:.3g} and {about[1]:.3g} rad,"
+    if signs.prod() < 0:
         inspection.refuse(
-            f"columns {' and '.join(columns)} are about {about[0]:.3g} and {about[1]:.3g} rad,"
-            f" which no standing '{robot.name}' has: change the sign of one of the joints, of its"
-            " velocity, torque and commands, too"
+            f"{said} which no standing '{robot.name}' has: change the sign of one of the joints, of"
+            " its velocity, torque and commands, too"
         )
+    if (signs < 0).all():
+        inspection.warn(f"{said} as a mirrored '{robot.name}' stands; check both joints' signs")
 
 
 _COMMON_PEAK = 60.0  # peak torque where the robot is unknown, N m

@@ -66,9 +66,10 @@ def cast(
         try:
             series.append(table[name].cast(kinds[name]))
         except pl.exceptions.PolarsError as error:
-            said = str(error).partition("\n")[0]
+            said = str(error).partition("\n")[0].rpartition("values: ")[2]
             raise RecordingError(
-                f"{origin}: column '{name}' must hold {kinds[name]}: {said}; delete a row of units."
+                f"{origin}: column '{name}' must hold numbers, not {said}; write them with a point,"
+                " leave a field empty where there is none, delete a row of units."
             ) from error
     return pl.DataFrame(series)
 
