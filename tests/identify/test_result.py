@@ -84,7 +84,7 @@ def test_what_does_not_exist_is_null_and_nobody_tells_of_it():
 
 @pytest.mark.parametrize(
     ("after", "said"),
-    [((0.005, 0.1), r"2\.44 times as much, knee"), ((0.09, 0.04), ""), ((0.07, 0.0002), "")],
+    [((0.005, 0.1), r"2\.44 times.*, knee, .*keep that"), ((0.09, 0.04), ""), ((0.07, 0.0002), "")],
 )
 def test_the_worse_joint_decides_whether_a_fit_is_worse(after, said):
     """A fit that is far better at the hip hides no knee; nobody minds a tenth of a mrad."""

@@ -45,7 +45,7 @@ def identifiability(
     vector: Array,
     residuals: Array,
     jacobian: Array,
-    change: Array | None = None,
+    change: Array | float = 0.0,
 ) -> Identifiability:
     """Judge a fit by its best search vector (k,), residuals there (m,) and their slopes (m, k).
 
@@ -64,9 +64,7 @@ def identifiability(
     scale = np.where(deviation > 0, deviation, 1.0)
     correlation = covariance / np.outer(scale, scale)
     np.fill_diagonal(correlation, 1.0)
-    shift = np.zeros(len(vector))
-    if change is not None:
-        shift = covariance @ (jacobian.T @ change) / max(variance, 1e-300)
+    shift = covariance @ (jacobian.T @ (change + 0 * residuals)) / max(variance, 1e-300)
     half = _NINETY_FIVE * deviation + np.abs(shift)
     total = covariance + np.outer(shift, shift) / _NINETY_FIVE**2
     unit = parameters.scale_at(vector)
@@ -75,10 +73,9 @@ def identifiability(
     values, (low, high) = parameters.values(vector), parameters.bounds
     near = _NEAR * np.minimum(high - low, 1.0)
     at_bound = ((vector - low <= near) | (high - vector <= near)).tolist()
-    statements = _statements(parameters, values, half, correlation, at_bound)
-    covariance = total * np.outer(wide, wide)
-    known = (values, half, correlation, covariance)
-    return Identifiability(parameters.names, *known, at_bound, statements)
+    known = (values, half, correlation, total * np.outer(wide, wide), at_bound)
+    said = _statements(parameters, values, half, correlation)
+    return Identifiability(parameters.names, *known, said)
 
 
 def correlation_time(residuals: Array) -> float:
@@ -97,20 +94,18 @@ def correlation_time(residuals: Array) -> float:
 
 
 def _statements(
-    parameters: ParameterSet, values: Array, half: Array, correlation: Array, at_bound: list[bool]
+    parameters: ParameterSet, values: Array, half: Array, correlation: Array
 ) -> list[str]:
     said, names = [], parameters.names
     least = np.where(parameters.shares, 0.0, parameters.scale)
     sizes = np.maximum(np.abs(values), least)  # a value near zero is known, too
-    for name, value, size, width, stuck in zip(names, values, sizes, half, at_bound, strict=True):
+    for name, value, size, width in zip(names, values, sizes, half, strict=True):
         if not np.isfinite(width):
             said.append(f"These data say nothing about '{name}'.")
         elif width > _UNTOLD * size:
             said.append(
                 f"'{name}' is {value:.3g} only to within {width:.2g}: these data hardly tell it."
             )
-        if stuck:
-            said.append(f"'{name}' stands at a bound of its search; its interval means little.")
     for i, first in enumerate(names):
         for j in range(i):
             if abs(correlation[i, j]) > _TIED and np.isfinite(half[[i, j]]).all():

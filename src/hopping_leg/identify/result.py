@@ -177,8 +177,8 @@ def warning(identified: Identified) -> str:
         return ""
     return (
         f"On data that it has not seen this fit errs {worse[joint]:.3g} times as much, {joint}, as"
-        " what it began with: do not use it; check the recordings' signs, units and gains, whose"
-        " links they are and what else moves them, or fit fewer parameters."
+        " what it began with: do not use it; keep that if it errs little, or check signs, units and"
+        " gains of the recordings, whose links they are and what else moves them, or fit less."
     )
 
 

@@ -105,8 +105,7 @@ def find_reach(
 def _find_some(
     legs: range, heights: tuple[float, float], shape: HopShape, planning: Planning
 ) -> list[Reach]:
-    found = (find_reach(leg, heights, shape, planning) for leg in legs)
-    return [reach for reach in found if reach is not None]
+    return [r for leg in legs if (r := find_reach(leg, heights, shape, planning)) is not None]
 
 
 def find_legs(
