@@ -145,14 +145,15 @@ class Noise(nn.Module):
 @pytest.mark.parametrize(
     ("graph", "size", "says"),
     [
-        (nn.Linear(14, 2), 14, r"15 numbers.*a\.toml"),
-        (nn.Linear(15, 3), 15, "two deterministic"),
-        (Noise(), 15, "at random"),
-        (nn.Sequential(nn.LayerNorm(15), nn.Linear(15, 2)), 15, ""),
+        (nn.Linear(14, 2), (1, 14), r"as \[1, 15\].*a\.toml"),
+        (nn.Linear(15, 2), (15,), r"takes \[\[15\]\], not observations as \[1, 15\]; export it so"),
+        (nn.Linear(15, 3), (1, 15), "two deterministic"),
+        (Noise(), (1, 15), "at random"),
+        (nn.Sequential(nn.LayerNorm(15), nn.Linear(15, 2)), (1, 15), ""),
     ],
 )
 def test_only_a_network_of_deterministic_actions_is_taken(graph, size, says, tmp_path):
-    file, zeros = tmp_path / "a.onnx", torch.zeros(1, size)
+    file, zeros = tmp_path / "a.onnx", torch.zeros(size)
     torch.onnx.export(graph, zeros, file, opset_version=20, dynamo=False)
     with pytest.raises(PolicyError, match=says) if says else nullcontext():
         load_controller(file, LEG)

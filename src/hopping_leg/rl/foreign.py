@@ -215,11 +215,11 @@ def _read_sb3(content: bytes, origin: str, size: int) -> Actor:
 
 def _wrap(content: bytes, origin: str, observation: Observation, card: Card) -> bytes:
     """Return a policy file with an ONNX network in the place of its actor."""
-    shown = [tuple(i.shape[1:]) for i in open_session(content, origin).get_inputs()]
-    if shown != [(observation.size,)]:
+    shown = [i.shape for i in open_session(content, origin).get_inputs()]
+    if [shape[1:] for shape in shown] != [[observation.size]]:
         raise PolicyError(
-            f"{origin} takes {shown}, not one observation of {observation.size} numbers; where its"
-            f" environment had options, tell them in {Path(origin).with_suffix('.toml')}."
+            f"{origin} takes {shown}, not observations as [1, {observation.size}]; export it so, or"
+            f" tell its environment's options in {Path(origin).with_suffix('.toml')}."
         )
     stand_in = DenseActor(nn.Linear(observation.size, 2))
     model = onnx.load_from_string(build_policy(stand_in, observation, card))
