@@ -38,9 +38,9 @@ class Rig:
 
 
 RIGS = {
-    "boom, 130 Hz": Rig("legv2_boom", "*torque*", "legv2", 0.14, (2.0, 4.0), (0.2, 0.4)),
+    "boom, 130 Hz": Rig("legv2_boom", "*torque*.csv.gz", "legv2", 0.14, (2.0, 4.0), (0.2, 0.4)),
     "boom, 200 Hz": Rig("legv2_boom_200hz", "*/", "legv2", 0.15, (3.0, 6.0), (0.3, 0.6), 20.0),
-    "rail": Rig("legv1_rail", "*", "legv1", 0.2, (50.0, 50.0), (2.0, 2.0)),
+    "rail": Rig("legv1_rail", "*.csv.gz", "legv1", 0.2, (50.0, 50.0), (2.0, 2.0)),
 }
 _LENGTHS = {"es_cmd0.4m": 0.361, "hopping": 0.3236}  # of the leg at lift-off on the rail, m
 _JUMP = 2.0  # rad/s, that a joint in the air does not have once its swing has ended
@@ -73,8 +73,6 @@ class Hop:
     """Of the leg, from where on it flies by its law, m."""
     lift_off: int
     """First row of that."""
-    touchdown: int
-    """Row in which the ground was felt; the last one."""
     rise: Array
     """Of the base since the push-off began, m, (rows,); NaN where none was measured."""
     boom: Boom
@@ -82,23 +80,15 @@ class Hop:
 
 
 def load_hops(folder: Path, rig: str) -> list[Hop]:
-    """Return the hops of all runs on a rig.
+    """Return the hops of a rig's runs that hold torques.
 
     Raises:
         UsageError: The folder holds no recording of the rig.
     """
-    return [hop for run in load_runs(folder, rig) for hop in hops_of(run, rig)]
-
-
-def load_runs(folder: Path, rig: str) -> list[Recording]:
-    """Return a rig's recordings that hold torques."""
-    files = RIGS[rig].files
-    paths = sorted(
-        (folder / RIGS[rig].folder).glob(files if files[-1] == "/" else f"{files}.csv.gz")
-    )
+    paths = sorted((folder / RIGS[rig].folder).glob(RIGS[rig].files))
     if not paths:
         raise UsageError(f"{folder} has no recordings in its folder {RIGS[rig].folder}.")
-    return [load_recording(path) for path in paths]
+    return [hop for path in paths for hop in hops_of(load_recording(path), rig)]
 
 
 def hops_of(run: Recording, rig: str) -> Iterator[Hop]:
@@ -126,8 +116,8 @@ def hops_of(run: Recording, rig: str) -> Iterator[Hop]:
             length = next(value for name, value in _LENGTHS.items() if run.name.startswith(name))
         yield Hop(
             run.name, rig, time[rows] - time[start], q[rows], qd[rows], torque[rows],
-            command[rows], target, length, lift_off - start, touchdown - start,
-            rise[rows] - rise[start], run.metadata.boom,
+            command[rows], target, length, lift_off - start, rise[rows] - rise[start],
+            run.metadata.boom,
         )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ fits that leave one recording out each and of the errors of the other runs' hops
 """
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,13 +15,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hopping_leg.arrays import Array
+from hopping_leg.cli.options import JsonFile
 from hopping_leg.evaluate import statistics
 from hopping_leg.figures import COLOURS, WIDTH, encode, styled
 from hopping_leg.io import replace_at, write_atomically
 from hopping_leg.robot import Robot, load_robot
 from studies.real_hops.recorded import RIGS, Hop, load_hops
 from studies.real_hops.simulated import Simulated, fall_apex, simulate
-from studies.shared import ROOT, recordings_folder, show_rows
+from studies.shared import ROOT, Row, recordings_folder, show_rows
 
 LEFT_OUT = ROOT / "studies/identification/results/real_leg.json"
 """What ``python -m studies.identification.real_leg`` found without each recording."""
@@ -84,7 +85,7 @@ def _with(robot: Robot, values: Mapping[str, float]) -> Robot:
     return robot
 
 
-def compare(folder: Path, report: Callable[[str], None]) -> tuple[dict[str, Any], list[Any]]:
+def compare(folder: Path) -> tuple[Row, list[Any]]:
     """Return every number, and of one hop per rig what a figure shows."""
     rows, counts, shown = [], {}, []
     boom, others = known()
@@ -96,7 +97,7 @@ def compare(folder: Path, report: Callable[[str], None]) -> tuple[dict[str, Any]
             robot = _with(load_robot(name), boom if how.robot == "legv2" else {})
             legs = [_with(robot, others.get(h.run, {}) if name == IDENTIFIED else {}) for h in hops]
             for drive in DRIVES if how.robot == "legv2" else ("measured",):
-                report(f"{rig}: {name}, {DRIVES[drive]}")
+                print(f"{rig}: {name}, {DRIVES[drive]}")
                 by_law = drive == "law"
                 found = simulate(hops, legs, by_law=by_law)
                 row = {"rig": rig, "robot": name, "model": ROBOTS[name], "drive": DRIVES[drive]}
@@ -113,11 +114,11 @@ def compare(folder: Path, report: Callable[[str], None]) -> tuple[dict[str, Any]
     return {"rows": rows, "hops": counts, "paper_error_mm": PAPER_MM}, shown
 
 
-def _row(hops: Sequence[Hop], found: Sequence[Simulated]) -> dict[str, Any]:
+def _row(hops: Sequence[Hop], found: Sequence[Simulated]) -> Row:
     """Return means and rms of the errors with intervals over runs, hops that failed among them."""
     each = [errors(hop, one) for hop, one in zip(hops, found, strict=True)]
     torques = [torque_errors(hop, one) for hop, one in zip(hops, found, strict=True)]
-    row: dict[str, Any] = {"hops": len(hops), "inside_90": None, "half_width_m": None}
+    row: Row = {"hops": len(hops), "inside_90": None, "half_width_m": None}
     runs = [hop.run for hop in hops]
     for name, unit in (("push", "s"), ("flight", "s"), ("speed", "m_s"), ("apex", "m")):
         values, of = np.array([e[name] for e in each]), np.array(runs)
@@ -141,7 +142,7 @@ def _moments(runs: Sequence[Array]) -> Array:
 
 def _coverage(
     hops: Sequence[Hop], found: Sequence[Simulated], spread: Sequence[Sequence[Simulated]]
-) -> dict[str, Any]:
+) -> Row:
     """Return the share of apexes within their predicted 90 % intervals, and the mean half width.
 
     An interval is that of all fits' predictions, each with the errors of hops of other runs.
@@ -190,12 +191,11 @@ class RealHops:
     """Folder with real recordings; default: the environment's HOPPING_LEG_RECORDINGS."""
     figure: Path | None = None
     """SVG file for simulated over recorded apexes."""
-    json: Path | None = None
-    """Write every number to this file."""
+    json: JsonFile = None
 
-    def measure(self) -> dict[str, Any]:
+    def measure(self) -> Row:
         """Run it, print and return every number."""
-        result, shown = compare(recordings_folder(self.recordings), print)
+        result, shown = compare(recordings_folder(self.recordings))
         columns = ("apex_mean_m", "apex_rms_m", "speed_mean_m_s", "push_mean_s", "flight_mean_s")
         show_rows(result["rows"], "rig", "robot", "drive", *columns)
         if self.figure is not None:

@@ -36,8 +36,6 @@ class Simulated:
     """N m, (ticks, 2)"""
     rise: Array
     """Of the base, m, (ticks,)."""
-    speed: Array
-    """Of the base, m/s, (ticks,)."""
     lift_off_s: float
     """When the flight's law begins; NaN if it never does."""
     touchdown_s: float
@@ -87,8 +85,8 @@ def simulate(
         end = int(np.argmax(falling)) if falling.any() else ticks - 1
         rows = slice(0, end + 1)
         touchdown = float(time[end]) if falling.any() else np.nan
-        course = (q[rows, k], torque[rows, k], rise[rows, k], speed[rows, k])
-        found.append(Simulated(time[rows], *course, push.flying_s, touchdown))
+        course = (time[rows], q[rows, k], torque[rows, k], rise[rows, k])
+        found.append(Simulated(*course, push.flying_s, touchdown))
     return found
 
 

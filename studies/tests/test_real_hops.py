@@ -26,9 +26,7 @@ def boom_hop(force=(75.0, 0.0), run="a", rise=0.3):
     target, still = np.array([0.845, -1.891]), np.zeros((100, 2))
     course = rise * np.sin(np.pi * time / time[-1])
     command = np.concatenate([torque[2:3], torque[2:3], torque[2:]])
-    return Hop(
-        run, "boom, 130 Hz", time, q, still, torque, command, target, 0.2, 12, 99, course, BOOM
-    )
+    return Hop(run, "boom, 130 Hz", time, q, still, torque, command, target, 0.2, 12, course, BOOM)
 
 
 def test_forces_are_those_of_the_torques():
@@ -74,7 +72,7 @@ def test_the_rails_apex_is_that_of_its_flight():
     q = np.linspace([1.2, -2.5], [0.5, -1.0], 200)
     torque = kinematics.jacobian(leg, q).swapaxes(1, 2) @ np.array([50.0, 0.0])
     time, none = np.arange(200) / 630, np.full(200, np.nan)
-    hop = Hop("r", "rail", time, q, 0 * q, torque, torque, q[0], 0.36, 150, 199, none, Boom())
+    hop = Hop("r", "rail", time, q, 0 * q, torque, torque, q[0], 0.36, 150, none, Boom())
     (found,) = simulate([hop], [leg])
     flown = found.touchdown_s - found.lift_off_s
     miss = errors(hop, found)["apex"]
