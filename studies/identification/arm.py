@@ -19,8 +19,9 @@ from hopping_leg.arrays import Array
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import Recording, make_recording
 from hopping_leg.identify.recording_format import RecordingMetadata
-from hopping_leg.robot import MotorLimit, Robot, load_robot
-from studies.identification.twin import BELIEVED
+from hopping_leg.robot import MotorLimit, Robot
+from studies.identification.study import Study
+from studies.identification.twin import believed
 from studies.shared import Row, host
 
 RATE = 200.0
@@ -158,58 +159,55 @@ def _distances(draws: Array, true: Array) -> Array:
     return np.asarray(np.einsum("ni,ij,nj->n", off, inverse, off))
 
 
-def coverage(arms: int, seconds: float, seed: int, threads: int) -> Row:
+def coverage(study: Study, seconds: float) -> Row:
     """Identify arms that differ, each from a recording of its own, with the default plan.
 
     Args:
-        arms: How many.
+        study: Number of arms, seed of the first and threads of each fit.
         seconds: Of each recording.
-        seed: Of the first arm.
-        threads: Of each fit.
 
     Returns:
         Shares of 95 % intervals that hold the truth, in all and by parameter, likewise of those of
         draws from the posterior, of truths that are, all numbers together, no farther out than
         95 % of the draws, and what fits take.
     """
-    robot = load_robot(BELIEVED)
-    inside: dict[str, list[bool]] = {}
-    errors: dict[str, list[float]] = {}
-    taken, drawn_inside, beside = [], [], []
-    for arm in track(range(arms), "arms", transient=True):
-        truth = draw_truth(robot, np.random.default_rng([seed, arm]))
-        recording = record_arm(robot, truth, seconds, seed + arm)
+    robot = believed()
+    names: list[str] = []
+    errors, taken, drawn_inside, beside = [], [], [], []
+    options = IdentifyOptions(threads=study.threads)
+    for arm in track(range(study.arms), "arms", transient=True):
+        truth = draw_truth(robot, np.random.default_rng([study.seed, arm]))
+        recording = record_arm(robot, truth, seconds, study.seed + arm)
         begin = time.perf_counter()
-        known = identify([recording], robot, options=IdentifyOptions(threads=threads))
+        known = identify([recording], robot, options=options)
         taken.append(time.perf_counter() - begin)
         found = known.identifiability
-        draws = known.posterior(_DRAWS, seed + arm)
-        true = np.array([truth.get(name, 1.0) for name in found.names])  # gains of the motors
+        draws = known.posterior(_DRAWS, study.seed + arm)
+        names = found.names
+        true = np.array([truth.get(name, 1.0) for name in names])  # gains of the motors
         low, high = np.quantile(draws, (0.025, 0.975), axis=0)
         drawn_inside += ((low <= true) & (true <= high)).tolist()
         far = _distances(draws, true)
         beside.append(bool(far[-1] <= np.quantile(far[:-1], 0.95)))
-        for name, value, half in zip(found.names, found.values, found.half_width, strict=True):
-            error = float(value - truth.get(name, 1.0))
-            inside.setdefault(name, []).append(abs(error) <= half)
-            errors.setdefault(name, []).append(error / half)
+        errors.append((found.values - true) / found.half_width)
+    inside = np.abs(errors) <= 1
     return {
         "rows": [
             {
                 "parameter": name,
                 "share_inside": float(np.mean(hits)),
-                "rms_error_over_half_width": float(np.sqrt(np.mean(np.square(errors[name])))),
+                "rms_error_over_half_width": float(np.sqrt(np.mean(np.square(missed)))),
             }
-            for name, hits in inside.items()
+            for name, hits, missed in zip(names, inside.T, np.transpose(errors), strict=True)
         ],
-        "share_inside": float(np.mean(list(inside.values()))),
+        "share_inside": float(np.mean(inside)),
         "share_inside_draws": float(np.mean(drawn_inside)),
         "share_among_draws": float(np.mean(beside)),
-        "intervals": sum(map(len, inside.values())),
-        "arms": arms,
+        "intervals": inside.size,
+        "arms": study.arms,
         "recorded_s": seconds,
         "fit_median_s": float(np.median(taken)),
         "fit_longest_s": max(taken),
-        "threads": threads,
+        "threads": study.threads,
         "host": host(),
     }

@@ -68,17 +68,14 @@ def identify_twin(study: Study, case: str, method: str) -> Row:
     """Identify one of ``CASES`` with one search; as ``fit``."""
     _, truth, fitted, _ = CASES[case]
     parameters = tuple(AIR) if case == FIXED else None
-    if method == "two-pass":
-        parameters = BEYOND_TABLE
     recordings = [record(truth, motion, study.seconds) for motion in fitted]
     return fit(study, method, recordings, _unseen(study, truth, fitted), truth, parameters)
 
 
 def paper_size(study: Study, method: str) -> Row:
     """Identify the twin from recordings of the paper's size; as ``fit``, with minutes."""
-    parameters = BEYOND_TABLE if method == "two-pass" else None
     recordings, unseen = record_paper(study.paper_seconds), _unseen(study, GROUND, tuple(_OTHER))
-    found = fit(study, method, recordings, unseen, GROUND, parameters)
+    found = fit(study, method, recordings, unseen, GROUND)
     minutes = {f"{kind}_minutes": found[f"{kind}_s"] / 60 for kind in ("wall", "cpu")}
     return {"recorded_s": 2 * study.paper_seconds, **minutes, **found}
 
@@ -89,13 +86,15 @@ def fit(
     recordings: Sequence[Recording],
     unseen: Mapping[Motion, Recording],
     truth: Mapping[str, float],
-    parameters: tuple[str, ...] | None,
+    parameters: tuple[str, ...] | None = None,
 ) -> Row:
     """Identify a known twin by one of ``METHODS`` and compare with the truth.
 
     ``unseen`` recordings judge the fit, ``truth`` is what differs from where it begins; without
-    parameters the plan decides what is fitted.
+    parameters the plan decides what is fitted. The paper's search fits ``BEYOND_TABLE``.
     """
+    if method == "two-pass":
+        parameters = BEYOND_TABLE
     effort = SearchOptions(generations=study.generations, population=study.population)
     options = IdentifyOptions(parameters, search=method, effort=effort, threads=study.threads)
     judges = list(unseen.values())

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from hopping_leg.cli.options import JsonFile
 from hopping_leg.errors import PhysicsError
 from hopping_leg.identify.cost import Objective
 from hopping_leg.identify.optimizers import SearchOptions, least_squares
@@ -26,7 +27,7 @@ from hopping_leg.identify.simulate import cut
 from hopping_leg.identify.validation import validate
 from hopping_leg.io import Tree, replace_at, write_atomically
 from hopping_leg.robot import JOINTS, Robot, load_robot, robot_from_tree, robot_text
-from studies.shared import main, recordings_folder
+from studies.shared import Row, main, recordings_folder
 
 SETS = {
     "F": ("legv2_fixed_base", "*.csv.gz"),
@@ -35,13 +36,12 @@ SETS = {
 }
 """Folders of recordings, and which of them hold torques."""
 BELT = [f"reality.knee.{n}" for n in ("stiffness", "stiffness_damping", "backlash", "efficiency")]
-KNEE = ["knee.friction", "knee.damping", "knee.armature", "thigh.inertia"]
+BY_BOOM = ["knee.friction", "knee.damping", "knee.armature", "thigh.inertia", *BELT]
 GRIPS = (1.0, 1.2, 1.4)
 """Friction of the ground that is tried, the best kept: whether a foot slips makes the cost jump.
 Its give stays the CAD's, which hops do not tell."""
 OF_BOOM = ["boom.weight", "boom.hip_friction", "drive.delay"]
 """No part of the robot."""
-BY_BOOM = [*KNEE, *BELT]
 BY_BASE = ["thigh.com", "hip.friction", "hip.damping"]
 BOUNDS = {"drive.delay": (0.0, 0.006), "reality.knee.stiffness": (50.0, 600.0)}
 BELTS = ((150.0, 0.25), (250.0, 0.05))
@@ -94,10 +94,8 @@ def fit(recordings: Sequence[Recording], robot: Robot, names: Sequence[str]) -> 
 
 def with_values(robot: Robot, values: Values) -> Robot:
     """Return the robot with those of the values that are a robot's, a delay as its latency."""
-    for name, value in values.items():
-        if name == "drive.delay":
-            robot = replace_at(robot, LATENCY, value)
-        elif not name.startswith(("drive.", "boom.")):
+    for name, value in named(values).items():
+        if not name.startswith(("drive.", "boom.")):
             robot = replace_at(robot, name, value)
     return robot
 
@@ -120,9 +118,7 @@ def jackknife(values: Sequence[float]) -> float:
     return _NINETY_FIVE * float(np.sqrt((n - 1) / n * spread))
 
 
-def judged(
-    recording: Recording, start: LegHypothesis, fitted: LegHypothesis
-) -> list[dict[str, Any]]:
+def judged(recording: Recording, start: LegHypothesis, fitted: LegHypothesis) -> list[Row]:
     """Return errors on a recording that no fit has seen, before and after, by joint and kind."""
     before, after = (validate([recording], h) for h in (start, fitted))
     kinds = {
@@ -160,7 +156,7 @@ def torque_scale(recordings: Sequence[Recording], robot: Robot, names: Sequence[
     return {joint: found.values[f"{joint}.torque_gain"] for joint in JOINTS}
 
 
-def identify(folder: Path) -> dict[str, Any]:
+def identify(folder: Path) -> Row:
     """Fit and judge; return every number."""
     sets = {
         key: [load_recording(p) for p in sorted((folder / name).glob(pattern))]
@@ -188,8 +184,8 @@ def identify(folder: Path) -> dict[str, Any]:
     boom = hops(with_values(first, {n: base.values[n] for n in BY_BASE}), GRIPS)
     told = boom.hypothesis.robot
     believed = tell("clamped base by the CAD", fit(clamped, cad, gains(clamped, cad)))
-    without: list[dict[str, Any]] = []
-    rows: list[dict[str, Any]] = []
+    without: list[Row] = []
+    rows: list[Row] = []
     for left in hopping:
         one = tell(
             f"hops without {left.name}", fit([r for r in hopping if r is not left], told, of_boom)
@@ -202,7 +198,7 @@ def identify(folder: Path) -> dict[str, Any]:
         other = tell(f"clamped base without {left.name}", fit(others, told, of_base))
         bases.append(other.values)
         rows += judged(left, fit(others, cad, gains(clamped, cad)).hypothesis, other.hypothesis)
-    scales: list[dict[str, Any]] = []
+    scales: list[Row] = []
     for key in ("B130", "B200"):
         runs = sets[key]
         each = [torque_scale([r for r in runs if r is not left], told, of_boom) for left in runs]
@@ -212,7 +208,7 @@ def identify(folder: Path) -> dict[str, Any]:
             scales.append({"rig": SETS[key][0], "joint": joint, "scale": ratio * whole[joint],
                            "half_width": ratio * half, "recordings": len(runs)})  # fmt: skip
             print(scales[-1], flush=True)
-    parameters: list[dict[str, Any]] = []
+    parameters: list[Row] = []
     for names, rig, value, fits in (
         (named(boom.values), "B", named(boom.values), [one["values"] for one in without]),
         (of_base, "F", base.values, bases),
@@ -256,10 +252,9 @@ class RealLeg:
     """Robot file to write."""
     recordings: Path | None = None
     """Folder with real recordings; default: the environment's HOPPING_LEG_RECORDINGS."""
-    json: Path | None = None
-    """Write every number to this file."""
+    json: JsonFile = None
 
-    def measure(self) -> dict[str, Any]:
+    def measure(self) -> Row:
         """Run it, write the robot file, and return every number."""
         found = identify(recordings_folder(self.recordings))
         if found["worse"]:

@@ -110,7 +110,7 @@ class Identify(Study):
             result["synthetic"] = synthetic(self)
         if "coverage" in self.parts:
             asked = {"arms": self.arms, "seed": self.seed, "threads": self.threads}
-            result["coverage"] = self.once("coverage", asked, _coverage)
+            result["coverage"] = self.once("coverage", asked, coverage, ARM_SECONDS)
         if "paper-size" in self.parts:
             rows = []
             for method in (m for m in PAPER_METHODS if m in self.searches):
@@ -145,7 +145,3 @@ class Identify(Study):
                     raise UsageError(unknown_name(kind, name, known))
         if "least-squares" not in self.searches and "synthetic" in self.parts:
             raise UsageError("Known twins are always identified by least squares, too; add it.")
-
-
-def _coverage(study: Study) -> Row:
-    return coverage(study.arms, ARM_SECONDS, study.seed, study.threads)

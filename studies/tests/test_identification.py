@@ -14,8 +14,7 @@ from studies.shared import main
 
 
 def test_twins_are_recorded_with_a_finer_step_than_fits_take():
-    recording = record(AIR, "swings", 16.0)
-    assert recording.trace.header["timestep_s"] < COARSE_TIMESTEP
+    assert record(AIR, "swings", 16.0).trace.header["timestep_s"] < COARSE_TIMESTEP
 
 
 def test_errors_are_relative_to_the_truth_and_claims_are_counted():
