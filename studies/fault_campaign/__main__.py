@@ -1,9 +1,7 @@
 """Run the study: ``python -m studies.fault_campaign --help``."""
 
-import sys
-
 from studies.fault_campaign.campaign import Faults
 from studies.shared import main
 
 if __name__ == "__main__":
-    sys.exit(main("fault_campaign", Faults))
+    raise SystemExit(main("fault_campaign", Faults))

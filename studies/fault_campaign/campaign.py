@@ -7,7 +7,6 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from functools import lru_cache
 from importlib.metadata import version
 from itertools import product
 from pathlib import Path
@@ -150,16 +149,11 @@ def play_case(case: Case) -> Row:
     began = time.perf_counter()
     try:
         trial = play_live if case.live else play
-        result = trial(case, FAMILIES[case.family], _robot(case.robot))
+        result = trial(case)
     except Exception as error:
         problem = f"the trial failed: {type(error).__name__}: {error}"
         result = Result("", problems=[problem])
     return {**asdict(case), **asdict(result), "seconds": time.perf_counter() - began}
-
-
-@lru_cache(maxsize=4)
-def _robot(name: str) -> Robot:
-    return load_robot(name)
 
 
 def show(result: Row) -> None:

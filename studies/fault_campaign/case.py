@@ -22,10 +22,10 @@ from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.emulator.server import EmulatorConfig, posture
-from hopping_leg.robot import Robot, SoftLimits, load_robot
+from hopping_leg.robot import SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE, SoftLimiter
 from hopping_leg.sim.randomization import TWIN_RANGES, Range, draw_twin
-from studies.fault_campaign.families import Family, Mishap
+from studies.fault_campaign.families import FAMILIES, Mishap
 from studies.fault_campaign.verdict import Limits
 
 HEIGHTS = (0.25, 0.30, 0.35)
@@ -100,20 +100,19 @@ class Result:
 
 
 class Scene:
-    """All that is drawn for a trial of a family, on a robot that the host is told."""
+    """All that is drawn for a trial: of a family, on the robot that the host is told."""
 
-    def __init__(self, case: Case, family: Family, robot: Robot) -> None:
+    def __init__(self, case: Case) -> None:
         rng = case.rng
-        self.case, self.family, self.robot = case, family, robot
-        self.mishap = family.draw(rng)
-        faults = tuple(filter(None, (self.mishap.fault, self.mishap.second)))
+        self.case, self.family = case, FAMILIES[case.family]
+        self.mishap = self.family.draw(rng)
         self.start = dataclasses.replace(
-            self.mishap.start or EmulatorConfig(faults=faults),
+            self.mishap.start or EmulatorConfig(faults=self.mishap.faults),
             robot=case.robot,
             seed=int(rng.integers(1 << 30)),
         )
-        if self.mishap.health is not None:
-            self.robot = load_robot(self.mishap.health.robot)
+        health = self.mishap.health
+        self.robot = load_robot(case.robot if health is None else health.robot)
         self.safety_limits = hopping_limits(self.robot, CONTROL_RATE)
         self.limits = Limits.of(self.robot, self.safety_limits)
         self.height = float(rng.choice(HEIGHTS))
@@ -185,9 +184,8 @@ def words(mishap: Mishap) -> str:
         faults = ", ".join(map(_of_fault, mishap.start.faults))
         homed = ", homed in its start pose" if mishap.homed else ""
         return f"{faults}{homed}" or f"pose {mishap.start.pose}"
-    if mishap.fault is not None:
-        both = map(_of_fault, filter(None, (mishap.fault, mishap.second)))
-        return f"{' and '.join(both)} at {mishap.fault.at:.3f} s"
+    if mishap.faults:
+        return f"{' and '.join(map(_of_fault, mishap.faults))} at {mishap.faults[0].at:.3f} s"
     if health := mishap.health:
         twin = "" if health.twin is None else f", twin {health.twin}"
         return f"{health.robot}{twin}{', stands' if health.stands else ''}"
@@ -197,7 +195,6 @@ def words(mishap: Mishap) -> str:
 
 
 def _of_fault(fault: Fault) -> str:
-    parts = [fault.kind, fault.drive, fault.name, f"value {fault.amount:.4g}"]
-    if fault.count > 1:
-        parts.append(f"{fault.count} times")
-    return " ".join(part for part in parts if part)
+    times = f"{fault.count} times" if fault.count > 1 else ""
+    parts = (fault.kind, fault.drive, fault.name, f"value {fault.amount:.4g}", times)
+    return " ".join(filter(None, parts))

@@ -2,7 +2,7 @@
 
 with EmulatorProcess(EmulatorConfig(robot="legv2")) as emulator:
     drive(emulator.path)
-    print(emulator.state().height)
+    print(emulator.state().q)
 """
 
 import multiprocessing
@@ -26,22 +26,13 @@ _PATIENCE = 60.0
 
 @dataclass(frozen=True)
 class EmulatorState:
-    """The truth about the emulated robot at a time, s, since the start: hip and knee, rad, m."""
+    """The truth about the emulated robot at a time, s, since the start: hip and knee, rad."""
 
     time: float
     modes: tuple[int, ...]
     q: tuple[float, ...]
-    height: float
     flown: float
     """When the foot left the ground for the first time, s; infinite if it did not yet."""
-
-
-@dataclass(frozen=True)
-class EmulatorRecord:
-    """What happened since the start."""
-
-    log: WireLog
-    """Commands and answers on the wire."""
     faults: tuple[tuple[float, Fault], ...]
     """Those that began, with when, s."""
 
@@ -68,9 +59,9 @@ class EmulatorProcess(AbstractContextManager["EmulatorProcess"]):
         """Return the truth about the robot now."""
         return cast(EmulatorState, self._ask("state"))
 
-    def record(self) -> EmulatorRecord:
-        """Return what went over the wire and which faults began."""
-        return cast(EmulatorRecord, self._ask("record"))
+    def log(self) -> WireLog:
+        """Return what went over the wire."""
+        return cast(WireLog, self._ask("log"))
 
     def inject(self, fault: Fault) -> None:
         """Let a fault happen; its time counts from now."""
@@ -120,12 +111,12 @@ def _answer_parent(pipe: Connection, robot: EmulatedRobot, log: WireLog) -> bool
             request = pipe.recv()
             if isinstance(request, Fault):
                 injector.add(request)
-            if request == "record":
-                pipe.send(EmulatorRecord(log, tuple(injector.log)))
+            if request == "log":
+                pipe.send(log)
             else:
                 modes = tuple(int(drive.machine.mode) for drive in robot.drives)
-                q, height = tuple(robot.leg.q.tolist()), robot.leg.height
-                pipe.send(EmulatorState(robot.time, modes, q, height, injector.flown))
+                q, faults = tuple(robot.leg.q.tolist()), tuple(injector.log)
+                pipe.send(EmulatorState(robot.time, modes, q, injector.flown, faults))
     except (EOFError, OSError):
         return False
     return True

@@ -38,8 +38,7 @@ class Mishap:
     """What happens in one trial.
 
     Attributes:
-        fault: Of wire or drives; None where the host itself is struck.
-        second: Another one.
+        faults: Of wire or drives; none where the host itself is struck.
         stall: How long the host stands still, s; 0 if it does not.
         dies: Whether the host is killed.
         start: Differences of the start, where the leg must not be armed at all.
@@ -48,8 +47,7 @@ class Mishap:
         health: Where nothing happens.
     """
 
-    fault: Fault | None = None
-    second: Fault | None = None
+    faults: tuple[Fault, ...] = ()
     stall: float = 0.0
     dies: bool = False
     start: EmulatorConfig | None = None
@@ -95,7 +93,7 @@ def _faulty(kind: str, values: Values = lambda _: {}) -> Draw:
     def draw(rng: np.random.Generator) -> Mishap:
         at = float(rng.uniform(0, HOP_SECONDS))
         options = {"drive": _drive(rng), **values(rng)}
-        return Mishap(Fault(kind, since="flight", at=at, **options), at=at)
+        return Mishap((Fault(kind, since="flight", at=at, **options),), at=at)
 
     return draw
 
@@ -211,7 +209,7 @@ def _severe(since: Literal["powered", "flight"], first: float, last: float) -> D
         kind = str(rng.choice(list(_SEVERE)))
         at = float(rng.uniform(first, last))
         options = {"drive": _drive(rng), **_SEVERE[kind](rng)}
-        return Mishap(Fault(kind, since=since, at=at, **options))
+        return Mishap((Fault(kind, since=since, at=at, **options),))
 
     return draw
 
@@ -219,8 +217,8 @@ def _severe(since: Literal["powered", "flight"], first: float, last: float) -> D
 def _double(rng: np.random.Generator) -> Mishap:
     """Two severe faults within 50 ms of each other."""
     at = float(rng.uniform(0, HOP_SECONDS))
-    first, second = (_severe("flight", at, at + 0.05)(rng).fault for _ in range(2))
-    return Mishap(first, second, at=at)
+    first, second = (_severe("flight", at, at + 0.05)(rng).faults for _ in range(2))
+    return Mishap(first + second, at=at)
 
 
 LIES = 4.0
@@ -247,7 +245,7 @@ def _lie(kind: str) -> Draw:
     """Return what draws a lie of a kind from arming to sinking."""
 
     def draw(rng: np.random.Generator) -> Mishap:
-        return Mishap(_lying(kind, float(rng.uniform(0, LIES)), rng), at=HOP_SECONDS)
+        return Mishap((_lying(kind, float(rng.uniform(0, LIES)), rng),), at=HOP_SECONDS)
 
     return draw
 
@@ -256,7 +254,7 @@ def _lie_and_fault(rng: np.random.Generator) -> Mishap:
     """A lie from arming to sinking, and a severe fault within 0.1 s of it."""
     at = float(rng.uniform(0, LIES))
     lie = _lying(str(rng.choice(list(_LIES))), at, rng)
-    return Mishap(lie, _severe("powered", at, at + 0.1)(rng).fault, at=HOP_SECONDS)
+    return Mishap((lie, *_severe("powered", at, at + 0.1)(rng).faults), at=HOP_SECONDS)
 
 
 _R = Reason

@@ -48,8 +48,7 @@ def judge_wire(result: Result, scene: Scene, log: WireLog, modes: Sequence[int])
     assert result.began is not None
     result.problems += problems_of_commands(log.commands, scene.limits)
     result.problems += restarts(log.commands, result.began)
-    fault = scene.mishap.fault
-    jumped = fault is not None and fault.kind == "encoder_jump"
+    jumped = "encoder_jump" in [fault.kind for fault in scene.mishap.faults[:1]]
     result.reaction = reaction(log, scene.limits, result.began, jumped=jumped)
     if result.reaction is not None and math.isinf(result.reaction):
         result.problems.append("no safe command followed a bad answer")
@@ -72,13 +71,13 @@ def judge_truth(result: Result, scene: Scene, log: WireLog, truth: Array, trace:
         trace: Of the run.
     """
     assert result.began is not None
-    kinds = {fault.kind for fault in (scene.mishap.fault, scene.mishap.second) if fault}
+    kinds = {fault.kind for fault in scene.mishap.faults}
     time, true, turned = truth[:, 0], truth[:, 3:5], truth[:, 5:7]
     off = [told.time for told in log.commands if told.mode in SAFE and told.time >= result.began]
     until = min(off, default=math.inf)
     said_at = trace.column("time_s") + time[0]
-    for fault in (scene.mishap.fault, scene.mishap.second):
-        if fault is not None and fault.kind in SHOWS:
+    for fault in scene.mishap.faults:
+        if fault.kind in SHOWS:
             joints = JOINTS if fault.drive == "both" else (fault.drive,)
             column, least = SHOWS[fault.kind]
             values = np.abs([trace.column(f"{name}_{column}") for name in joints]).max(axis=0)

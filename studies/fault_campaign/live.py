@@ -16,11 +16,10 @@ from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.transport import open_transport
 from hopping_leg.errors import TraceError
 from hopping_leg.flight_recording import SUFFIX, recover
-from hopping_leg.robot.parameters import JOINTS, Robot
+from hopping_leg.robot.parameters import JOINTS
 from hopping_leg.trace import Trace
 from studies.fault_campaign.case import Case, Result, Scene, words
 from studies.fault_campaign.emulator_process import EmulatorProcess
-from studies.fault_campaign.families import Family
 from studies.fault_campaign.judging import (
     judge_braking,
     judge_trace,
@@ -47,9 +46,9 @@ _AFTERWARDS = 0.15
 """How long the drives are watched after the host's death, s."""
 
 
-def play_live(case: Case, family: Family, robot: Robot) -> Result:
+def play_live(case: Case) -> Result:
     """Run and judge a trial of a family of ``LIVE``; a signal raises ``KeyboardInterrupt``."""
-    scene = Scene(case, family, robot)
+    scene = Scene(case)
     with EmulatorProcess(scene.start) as emulator, tempfile.TemporaryDirectory() as folder:
         if scene.mishap.dies:
             return _killed(scene, emulator, Path(folder))
@@ -63,14 +62,14 @@ def _hop(scene: Scene, emulator: EmulatorProcess, folder: Path) -> Result:
         done = scene.perform(link, folder)
     finally:
         link.close()
-    record = emulator.record()
+    log, state = emulator.log(), emulator.state()
     reason = done.outcome.supervisor.stop_cause.reason
-    result.disturbed = not record.faults or (
+    result.disturbed = not state.faults or (
         reason in _OF_A_SLOW_COMPUTER and reason not in scene.family.reasons
     )
-    powered = (told.time for told in record.log.commands if told.mode is DriveMode.POSITION)
-    result.began = record.faults[0][0] if record.faults else next(powered, 0.0)
-    judge_wire(result, scene, record.log, emulator.state().modes)
+    powered = (told.time for told in log.commands if told.mode is DriveMode.POSITION)
+    result.began = state.faults[0][0] if state.faults else next(powered, 0.0)
+    judge_wire(result, scene, log, state.modes)
     judge_trace(result, done, None if result.disturbed else scene.family)
     return result
 
@@ -95,7 +94,7 @@ def _killed(scene: Scene, emulator: EmulatorProcess, folder: Path) -> Result:
         result.disturbed = True
         return result
     time.sleep(_AFTERWARDS)
-    judge_braking(result, _braked(emulator.record().log, result.began))
+    judge_braking(result, _braked(emulator.log(), result.began))
     result.problems += problems_of_box(folder)
     return result
 
@@ -125,7 +124,7 @@ def _flown(emulator: EmulatorProcess, seconds: float) -> bool:
 def _braked(log: WireLog, death: float) -> float | None:
     """Return the time from the host's death until both drives have left torque mode, s."""
     left: dict[int, float] = {}
-    for change in log.changes:
-        if change.time >= death and change.mode is not DriveMode.POSITION:
-            left.setdefault(change.joint, change.time - death)
+    for moment, joint, mode in log.changes:
+        if moment >= death and mode is not DriveMode.POSITION:
+            left.setdefault(joint, moment - death)
     return max(left.values()) if len(left) == len(JOINTS) else None

@@ -14,9 +14,7 @@ from hopping_leg.emulator.leg import TIMESTEP
 from hopping_leg.emulator.mode_machine import CONTROLLING
 from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import HardwareError
-from hopping_leg.robot.parameters import Robot
 from studies.fault_campaign.case import Case, Result, Scene, words
-from studies.fault_campaign.families import Family
 from studies.fault_campaign.judging import (
     judge_braking,
     judge_trace,
@@ -101,13 +99,13 @@ def _braking(drive: EmulatedDrive) -> bool:
     return machine.mode is DriveMode.BRAKE or machine.mode not in CONTROLLING
 
 
-def play(case: Case, family: Family, robot: Robot) -> Result:
+def play(case: Case) -> Result:
     """Run and judge a trial."""
-    scene = Scene(case, family, robot)
+    scene = Scene(case)
     try:
-        result = _refused(scene) if family.refused else _hop(scene)
+        result = _refused(scene) if scene.family.refused else _hop(scene)
     except HardwareError:
-        if not family.grounded:
+        if not scene.family.grounded:
             raise
         result = _refused(scene)  # by where its joints stand, as they are wired
     if scene.mishap.dies:

@@ -33,21 +33,11 @@ class ReplyEvent:
     time: float
     joint: int
     mode: DriveMode
-    fault: int
     voltage: float
     temperature: float
 
 
-@dataclass(frozen=True, slots=True)
-class ModeChange:
-    """A drive's change of mode."""
-
-    time: float
-    joint: int
-    mode: DriveMode
-
-
-_TOLD = (Register.MODE, Register.FAULT, Register.VOLTAGE, Register.TEMPERATURE)
+_TOLD = (Register.MODE, Register.VOLTAGE, Register.TEMPERATURE)
 """Registers of an answer that is noted."""
 _REMEMBERED = 100_000  # Commands and answers each, about a minute's
 
@@ -58,7 +48,7 @@ class WireLog:
     def __init__(self) -> None:
         self.commands: deque[CommandEvent] = deque(maxlen=_REMEMBERED)
         self._replies: deque[tuple[float, int, bytes]] = deque(maxlen=_REMEMBERED)
-        self.changes: deque[ModeChange] = deque(maxlen=_REMEMBERED)
+        self.changes: deque[tuple[float, int, DriveMode]] = deque(maxlen=_REMEMBERED)
         self._modes = [DriveMode.STOPPED, DriveMode.STOPPED]
 
     def record(self, time: float, joint: int, message: bus.Message, answer: Frame | None) -> None:
@@ -79,12 +69,11 @@ class WireLog:
                 continue
             values = parse_reply(data)
             if values.keys() >= set(_TOLD):
-                mode, fault, voltage, temperature = (values[register] for register in _TOLD)
-                mode = DriveMode(int(mode))
-                yield ReplyEvent(time, joint, mode, int(fault), voltage, temperature)
+                mode, voltage, temperature = (values[register] for register in _TOLD)
+                yield ReplyEvent(time, joint, DriveMode(int(mode)), voltage, temperature)
 
     def record_mode(self, time: float, joint: int, mode: DriveMode) -> None:
         """Note a drive's mode after a step, if it is another."""
         if mode is not self._modes[joint]:
             self._modes[joint] = mode
-            self.changes.append(ModeChange(time, joint, mode))
+            self.changes.append((time, joint, mode))

@@ -34,7 +34,7 @@ def test_a_family_draws_the_same_from_the_same_seed_and_much_else_from_others(na
     assert len({str(mishap) for mishap in mishaps}) > 10
     for m in mishaps:
         assert 0 <= m.at <= HOP_SECONDS
-        assert m.fault or m.start or m.stall or m.dies or m.health
+        assert m.faults or m.start or m.stall or m.dies or m.health
         assert (m.start is not None) == (family.refused or family.grounded)
     assert family.reasons or family.refused or name == "killed host"
 
@@ -44,7 +44,7 @@ def test_every_kind_of_the_emulators_faults_is_in_a_family():
     for family in FAMILIES.values():
         for seed in range(20):
             mishap = family.draw(np.random.default_rng(seed))
-            faults = [mishap.fault] if mishap.fault else mishap.start.faults if mishap.start else []
+            faults = mishap.start.faults if mishap.start else mishap.faults
             kinds |= {fault.kind for fault in faults}
     assert kinds == set(KINDS)
     assert set(LIVE) <= set(FAMILIES)
@@ -171,7 +171,7 @@ def told(time, mode=DriveMode.POSITION, torque=1.0, most=10.0):
 
 
 def answered(time, mode=DriveMode.POSITION, voltage=24.0, temperature=30.0):
-    return ReplyEvent(time, 0, mode, 0, voltage, temperature)
+    return ReplyEvent(time, 0, mode, voltage, temperature)
 
 
 def reaction_to(*entries, jumped=False):

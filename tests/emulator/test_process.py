@@ -83,7 +83,7 @@ def test_a_plug_comes_back_under_the_same_name(tmp_path):
         while not link.exists() and time.monotonic() < until:
             time.sleep(0.01)
         assert talk(emulator, ask) == 1
-        assert [fault.kind for _, fault in emulator.record().faults] == ["unplug"]
+        assert [fault.kind for _, fault in emulator.state().faults] == ["unplug"]
     assert not link.is_symlink()
 
 
