@@ -32,7 +32,7 @@ REFUSED = [
     ("evaluate spring --json empty.csv/x.json", "x.json cannot be written"),
     ("deploy fasst", "Did you mean 'fast'"),
     ("deploy fast --command 0.6", f"from {FAST.command_low:.2f} to {FAST.command_high:.2f} m"),
-    ("deploy fast --robot legv2", "Name its file with --robot, train one"),
+    ("deploy fast --robot legv2", "; name its own with --robot. Train one"),
     ("deploy energy-shaping --schedule 0.3", "is no step of a schedule"),
     ("deploy energy-shaping --schedule 0.3:2 --command 0.3", "exclude each other"),
     ("deploy energy-shaping --seconds -1", "--seconds is -1"),

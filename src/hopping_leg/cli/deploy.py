@@ -98,7 +98,7 @@ def _sequence(args: Deploy, robot: Robot) -> "motion_sequence.MotionSequence":
     if isinstance(controller, policy.Policy):
         stranger = controller.stranger(robot, args.controller)
         if stranger and not args.other_robot:
-            remedy = "Name its file with --robot, train one with `hop train`, or add --other-robot."
+            remedy = "Train one for it with `hop train --robot`, or add --other-robot."
             raise PolicyError(f"{stranger} {remedy}")
         options.say(*filter(None, [stranger]))
         if controller.seconds > _MOST_SHARE / CONTROL_RATE:

@@ -272,7 +272,7 @@ class Policy:
             )
         return (
             f"{name} was trained on robot '{card.robot}' ({card.robot_digest}), not on"
-            f" '{robot.name}' ({robot.digest})."
+            f" '{robot.name}' ({robot.digest}); name its own with --robot."
         )
 
     def reset(self, count: int) -> None:
