@@ -102,8 +102,7 @@ def test_a_row_has_the_newest_command_that_was_logged_by_then(tmp_path):
     table = pl.DataFrame({"time_s": [0.0, 0.01, 0.02], "hip_position_rad": [1.0, 2.0, 3.0]})
     late = pl.DataFrame({"time_s": [0.005, 0.015], "hip_command_nm": [5.0, 6.0]})
     record(tmp_path / "bag", "mcap", table, late)
-    back = read(tmp_path / "bag")
-    assert back["hip_command_nm"].to_list() == [None, 5.0, 6.0]
+    assert read(tmp_path / "bag")["hip_command_nm"].to_list() == [None, 5.0, 6.0]
 
 
 def test_a_sidecar_names_joints_that_are_called_otherwise(tmp_path):

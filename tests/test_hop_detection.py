@@ -54,8 +54,7 @@ def test_several_apexes_of_one_flight_are_one_hop_as_high_as_the_highest():
 
 @pytest.mark.parametrize(("first", "missing"), [(8, 0), (8, 1), (8, 2), (8, 3), (10, 10)])
 def test_missing_apexes_are_counted_one_by_one_also_at_the_end(first, missing):
-    ticks = np.arange(50, 2000, 100)
-    gone = np.delete(ticks, slice(first, first + missing))
+    gone = np.delete(np.arange(50, 2000, 100), slice(first, first + missing))
     assert count_skipped(gone, np.empty(0, dtype=int), 0, 2000, RATE) == missing
 
 

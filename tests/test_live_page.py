@@ -11,7 +11,7 @@ import pytest
 
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.rollout import RolloutConfig, rollout
-from hopping_leg.hop_detection import find_hops
+from hopping_leg.hop_detection import COLUMNS, find_hops
 from hopping_leg.robot import TIMESTEP, load_robot, shipped_robots
 from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.leg_table import LEG, leg_table
@@ -172,8 +172,7 @@ def test_first_hops_are_those_of_the_package_with_the_same_draws_and_keep_pace(
     torques = np.array(found["torques"]).T
     for name, values in zip(("hip", "knee"), torques, strict=True):
         np.testing.assert_allclose(values[:30], column[f"{name}_command_nm"][:30], atol=1e-4)
-    names = ("height_m", "height_rate_m_s", "foot_clearance_m")
-    apexes = find_hops(*(column[name] for name in names)).apex
+    apexes = find_hops(*(column[name] for name in COLUMNS)).apex
     assert len(apexes) >= hops
     np.testing.assert_allclose(found["apexes"][:hops], apexes[:hops], atol=1e-4)
     assert np.median(found["took"][100:]) < 1.0, "ms"

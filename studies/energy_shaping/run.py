@@ -14,7 +14,7 @@ from hopping_leg.controllers.energy_shaping.controller import EnergyShaping, Lit
 from hopping_leg.controllers.energy_shaping.virtual_leg import LegView, Phase
 from hopping_leg.evaluate.metrics import HopWindow, measure
 from hopping_leg.evaluate.result import summarise
-from hopping_leg.io import plain
+from hopping_leg.io import plain, replace_at
 from hopping_leg.robot import DEFAULT_ROBOT, TIMESTEP, Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, LegSimulator, NoiseAndDelay
 from hopping_leg.trace import Trace
@@ -135,8 +135,7 @@ def cases(robot: Robot) -> list[Case]:
 
 
 def _heavier(robot: Robot, share: float) -> Robot:
-    base = replace(robot.base, mass=robot.base.mass + share * robot.mass)
-    return replace(robot, base=base)
+    return replace_at(robot, "base.mass", robot.base.mass + share * robot.mass)
 
 
 @dataclass(frozen=True)

@@ -255,8 +255,7 @@ def score(rollout: Rollout, command: float, legs: slice) -> CommandScore:
     """Score the legs of a rollout that have one command."""
     data, kept = rollout.data, rollout.time >= SETTLED
     period = rollout.time[1] - rollout.time[0]
-    names = ("height_m", "height_rate_m_s", "foot_clearance_m")
-    columns = (data[name][kept, legs].T for name in names)
+    columns = (data[name][kept, legs].T for name in hop_detection.COLUMNS)
     hops = [
         hop_detection.measure_hops(h, v, c, 1 / period) for h, v, c in zip(*columns, strict=True)
     ]

@@ -34,7 +34,10 @@ _STIFFNESS, _DAMPING = 40.0, 1.0
 
 @dataclass(frozen=True)
 class Env:
-    """Time the environment against bare physics and Gymnasium's Hopper-v5."""
+    """Time the environment against bare physics and Gymnasium's Hopper-v5.
+
+    The batched environment is also timed at the converged physics step.
+    """
 
     robot: RobotFile = DEFAULT_ROBOT
     count: int = 512
@@ -47,10 +50,6 @@ class Env:
     """Rounds; medians over them are reported."""
     threads: int = 0
     """Of the batched environment and the batched physics alike, 0 for one per core."""
-    timestep: float = COARSE_TIMESTEP
-    """Physics step, s; the batched environment is also timed at the converged one."""
-    seed: int = 0
-    """Of noise and delay."""
     json: JsonFile = None
 
     def measure(self) -> Row:
@@ -88,7 +87,7 @@ class Env:
                 "legs": self.count,
                 "threads": self.threads,
                 "repeats": self.repeats,
-                "timestep_s": self.timestep,
+                "timestep_s": COARSE_TIMESTEP,
                 "converged_timestep_s": TIMESTEP,
                 "substeps": substeps,
                 "noise_and_delay": True,
@@ -100,25 +99,25 @@ class Env:
 
     def _functions(self) -> tuple[dict[str, Timed], int]:
         """Return what is timed, and the physics steps of a control period."""
-        robot, rng = load_robot(self.robot), np.random.default_rng(self.seed)
+        robot, rng = load_robot(self.robot), np.random.default_rng(0)
         hip, knee = robot.of_joints("torque_limit").tolist()
-        options = TaskConfig(action_torque=(hip, knee), timestep=self.timestep, episode=3600.0)
+        options = TaskConfig(action_torque=(hip, knee), timestep=COARSE_TIMESTEP, episode=3600.0)
         task, fine = (
             HoppingTask(robot, self.count, each, paper_reward(robot), rng, self.threads)
             for each in (options, replace(options, timestep=TIMESTEP))
         )
         many, many_fine = record(task, self.ticks), record(fine, self.ticks)
         env = HoppingEnv(robot, options)
-        env.reset(seed=self.seed)
+        env.reset(seed=0)
         one = record(env.task, self.single_ticks)
         bare, plain, twin = (
-            LegSimulator(leg, self.count, timestep=self.timestep, threads=threads)
+            LegSimulator(leg, self.count, timestep=COARSE_TIMESTEP, threads=threads)
             for leg, threads in ((robot, self.threads), (robot, 1), (load_robot("twin"), 1))
         )
         hopper = gymnasium.make(
             "Hopper-v5", frame_skip=bare.substeps, terminate_when_unhealthy=False
         ).unwrapped
-        hopper.reset(seed=self.seed)
+        hopper.reset(seed=0)
         return {
             "batched_env": lambda: _run_task(task, many),
             "batched_env_converged": lambda: _run_task(fine, many_fine),
@@ -171,8 +170,7 @@ def _run_task(task: HoppingTask, motion: Motion) -> None:
 
 def _run_env(env: HoppingEnv, motion: Motion) -> None:
     env.task.restore(motion.start)
-    actions = motion.actions[:, 0].astype(np.float32)
-    for action in actions:
+    for action in motion.actions[:, 0].astype(np.float32):
         env.step(action)
 
 

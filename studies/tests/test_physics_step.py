@@ -24,7 +24,6 @@ def test_energy_shaping_hops_alike_at_both_steps():
     study = PhysicsStep(
         ("energy-shaping",), ("legv2-paper",), (0.3,), 5e-4, halvings=1, repeats=3, duration=4
     )  # fmt: skip
-    result = study.measure()
-    coarse, fine = result["rows"]
+    coarse, fine = study.measure()["rows"]
     assert coarse["hops"] >= 10
     assert coarse["median_error_m"] == pytest.approx(fine["median_error_m"], abs=0.005)

@@ -161,8 +161,7 @@ def test_the_emulator_names_the_terminal_and_ends_with_ctrl_c(tmp_path):
     pipe = subprocess.PIPE
     process = subprocess.Popen([*words, "--link", link], stdout=pipe, stderr=pipe, text=True)
     try:
-        first = process.stdout.readline()
-        assert first == f"Drives 1 and 2 of legv1 behind {link}\n"
+        assert process.stdout.readline() == f"Drives 1 and 2 of legv1 behind {link}\n"
         assert link.resolve().parent == Path("/dev/pts")
         process.send_signal(signal.SIGINT)
         rest, errors = process.communicate(timeout=30)

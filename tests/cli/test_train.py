@@ -23,8 +23,7 @@ def test_a_training_leaves_policy_card_and_json(tiny, tmp_path, capsys, refused)
     arguments = ["train", "--recipe", "tiny", "--out", str(out), "--json", str(file)]
     arguments += ["--set", "gamma=0.9"]
     assert cli.main(arguments) == 0
-    shown = capsys.readouterr().out
-    assert str(out / "policy.onnx") in shown
+    assert str(out / "policy.onnx") in capsys.readouterr().out
     assert (out / "policy.onnx").exists()
     result = json.loads(file.read_text())
     assert result["history"]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hopping_leg.hop_detection import find_hops
+from hopping_leg.hop_detection import COLUMNS, find_hops
 from hopping_leg.sim.channel import Measurement
 
 
@@ -13,7 +13,12 @@ def measurement(count):
     return Measurement(q, qd, command, np.zeros((count, 3)))
 
 
+def steady(q, qd, command=0.3):
+    """Return a measurement of one leg whose samples are all the same."""
+    samples = (np.tile(np.array(values, float), (1, 3, 1)) for values in (q, qd))
+    return Measurement(*samples, np.full((1, 3), command), np.zeros((1, 3)))
+
+
 def hops_of(run, leg):
     """Return the hops of a leg in a rollout."""
-    columns = ("height_m", "height_rate_m_s", "foot_clearance_m")
-    return find_hops(*(run.data[name][:, leg] for name in columns))
+    return find_hops(*(run.data[name][:, leg] for name in COLUMNS))

@@ -12,14 +12,12 @@ from hopping_leg.controllers.rollout import rollout
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.onnx_export import with_card
 from hopping_leg.robot import load_robot
-from hopping_leg.sim.channel import Measurement
-from tests.controllers.measurements import hops_of
+from tests.controllers.measurements import hops_of, steady
 
 FAST = load_policy("fast")
 ROBOT = load_robot(FAST.card.robot)
 LOW, HIGH = (0.0, -2.0, -10.0, -20.0), (1.0, -0.5, 10.0, 20.0)
-JOINTS = np.tile((0.5, -1.2), (1, 3, 1))
-INSIDE = Measurement(JOINTS, 0 * JOINTS, np.full((1, 3), 0.3), np.zeros((1, 3)))
+INSIDE = steady((0.5, -1.2), (0.0, 0.0))
 
 
 def fallback(policy):

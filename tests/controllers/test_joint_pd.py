@@ -4,12 +4,8 @@ import pytest
 from hopping_leg.controllers.joint_pd import JointGains, JointPD
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
-from hopping_leg.sim import NO_NOISE, LegSimulator, Measurement, Plant
-
-
-def seen(q, qd):
-    samples = [np.repeat(np.array(v, float)[None, None], 3, axis=1) for v in (q, qd)]
-    return Measurement(*samples, np.zeros((1, 3)), np.zeros((1, 3)))
+from hopping_leg.sim import NO_NOISE, LegSimulator, Plant
+from tests.controllers.measurements import steady
 
 
 def test_torque_is_the_law_and_the_end_is_held():
@@ -18,9 +14,9 @@ def test_torque_is_the_law_and_the_end_is_held():
     pd = JointPD(position, velocity, JointGains((10.0, 20.0), (0.5, 0.25)))
     for _ in range(2):
         pd.reset(1)
-        np.testing.assert_allclose(pd.act(seen([0, 0], [0, 0])), [[1.5, -3.5]])
+        np.testing.assert_allclose(pd.act(steady([0, 0], [0, 0])), [[1.5, -3.5]])
         for _ in range(3):
-            np.testing.assert_allclose(pd.act(seen([0.3, -0.4], [2.0, 0.0])), [[0.5, 1.0]])
+            np.testing.assert_allclose(pd.act(steady([0.3, -0.4], [2.0, 0.0])), [[0.5, 1.0]])
             assert pd.internals()["knee_position_command_rad"][0] == -0.4
 
 

@@ -20,8 +20,7 @@ def measurements(ticks, count=4, seed=0, disturbance=LATE):
         q = np.tile([tick, -tick], (count, 1)).astype(float)
         if tick == 0:
             channel.restart(slice(None), q, q, np.full(count, 0.3))
-        samples = channel.samples(q, 10 * q, np.full(count, 0.3))
-        yield tick, channel.measurement(samples)
+        yield tick, channel.measurement(channel.samples(q, 10 * q, np.full(count, 0.3)))
         channel.actuate(np.zeros((count, 2)))
 
 

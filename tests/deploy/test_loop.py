@@ -242,8 +242,7 @@ def test_one_sample_stands_for_the_past_and_there_is_none_without_both_joints():
 def test_a_hop_of_some_ticks_lasts_so_many_wherever_time_began(ticks, began):
     timing = SequenceTiming(hop=ticks / 200, rise=0.4, squat=0.2, settle=0.1)
     times = began + np.arange(ticks + 240) * 0.005 - began
-    parts = [timing.phase(time)[0] for time in times]
-    assert parts.count(Part.HOP) == ticks
+    assert [timing.phase(time)[0] for time in times].count(Part.HOP) == ticks
 
 
 @pytest.mark.parametrize("name", [n for n in shipped_robots() if load_robot(n).kind == "leg"])

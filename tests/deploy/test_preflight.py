@@ -79,9 +79,8 @@ def test_there_and_back_is_the_identity_and_power_is_kept(transform, angle, torq
 
 
 def test_limits_of_a_reversed_motor_stay_in_order():
-    robot = load_robot("legv2")
-    hip = replace(robot.hip, stop_lower=-0.5, stop_upper=1.5)
-    robot = replace(robot, hip=hip, hardware=Hardware(hip=Servo(sign=-1.0)))
+    hip = replace(LEG.hip, stop_lower=-0.5, stop_upper=1.5)
+    robot = replace(LEG, hip=hip, hardware=Hardware(hip=Servo(sign=-1.0)))
     found = {setting.name: setting for setting in required_settings(robot, 0)}
     low, high = found["servopos.position_min"], found["servopos.position_max"]
     assert low.value == pytest.approx(-1.5 / math.tau)

@@ -75,8 +75,7 @@ def test_a_host_that_gets_a_signal_or_whose_input_ends_brakes_stops_and_says_so(
     assert "Traceback" not in error
     assert "Wrote" in out
     assert not box.exists()
-    trace = Trace.load(box.with_suffix(".parquet"))
-    states = trace.column("state")
+    states = Trace.load(box.with_suffix(".parquet")).column("state")
     assert (np.diff(states) >= 0).all()
     assert states[-1] == State.STOPPED
     time.sleep(0.2)

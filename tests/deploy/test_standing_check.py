@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -7,8 +5,10 @@ from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.standing_check import upward_force
+from hopping_leg.io import replace_at
 from hopping_leg.robot import dynamics, kinematics, load_robot
-from hopping_leg.sim import LegSimulator, Measurement
+from hopping_leg.sim import LegSimulator
+from tests.controllers.measurements import steady
 from tests.deploy.fakes import Still
 
 TIMING = SequenceTiming(rise=1.5)
@@ -72,13 +72,7 @@ def share_that_may_hop(robot, wiring, *, truth=None, seed=0):
         stopped |= ((np.minimum(q, ahead) < limits.lower) | (ahead > limits.upper)).any(axis=1)
         torque = np.zeros((COUNT, 2))
         for i in np.flatnonzero(~stopped):
-            seen = Measurement(
-                np.repeat(q[i, None, None], 3, axis=1),
-                np.repeat(qd[i, None, None], 3, axis=1),
-                np.full((1, 3), 0.3),
-                np.zeros((1, 3)),
-            )
-            step = sequences[i].step(tick / 200, seen)
+            step = sequences[i].step(tick / 200, steady(q[i], qd[i]))
             stopped[i] = bool(step.trouble)
             torque[i] = np.clip(step.torque, -most, most)
             squatted[i] = step.phase is Part.SETTLE
@@ -125,6 +119,5 @@ def test_a_leg_of_its_file_may_hop_and_so_may_one_whose_friction_no_file_tells(r
 def test_a_leg_much_heavier_or_lighter_than_its_file_does_not_hop():
     robot = load_robot("legv2")
     for share in (0.6, 1.5):
-        base = replace(robot.base, mass=share * robot.mass - robot.mass + robot.base.mass)
-        other = replace(robot, base=base)
+        other = replace_at(robot, "base.mass", (share - 1) * robot.mass + robot.base.mass)
         assert share_that_may_hop(robot, np.eye(2), truth=other) == 0

@@ -1,6 +1,5 @@
 """An emulated robot on the bench: the client library's commands, time moved by hand."""
 
-import dataclasses
 import math
 
 import moteus
@@ -8,7 +7,8 @@ import numpy as np
 
 from hopping_leg.deploy.frames import REPLY_WANTED, Frame, padded
 from hopping_leg.emulator.robot import EmulatedRobot
-from hopping_leg.robot import load_robot
+from hopping_leg.io import replace_at
+from hopping_leg.robot import JOINTS, load_robot
 from hopping_leg.robot.model_mismatch import SensorMismatch
 
 R = moteus.Register
@@ -17,11 +17,9 @@ R = moteus.Register
 def exact(robot):
     """Return a robot whose sensors have no noise to speak of."""
     sensor = SensorMismatch(position_noise=1e-15)
-    drives = {
-        name: dataclasses.replace(getattr(robot.reality, name), sensor=sensor)
-        for name in ("hip", "knee")
-    }
-    return dataclasses.replace(robot, reality=dataclasses.replace(robot.reality, **drives))
+    for joint in JOINTS:
+        robot = replace_at(robot, f"reality.{joint}.sensor", sensor)
+    return robot
 
 
 class Bench:

@@ -16,6 +16,7 @@ from hopping_leg.identify.paper_excitation import Stroke, Strokes, adapt, fixed_
 from hopping_leg.robot import build_model, kinematics, load_robot
 from hopping_leg.trace import Trace
 from tests.identify.runs import RECORDINGS, needs_recordings, swinging
+from tests.sim.legs import with_joints
 
 ROBOT = load_robot("legv2")
 REACH = ROBOT.thigh.length + ROBOT.shank.length
@@ -35,8 +36,7 @@ def stopped(**stops):
 @pytest.mark.parametrize("swing", [10.0, None], ids=["swinging", "vertical"])
 def test_the_foot_follows_the_papers_formula(bend, swing):
     time = np.arange(0, 10, 0.005)
-    stroke = Stroke(0.1, 0.5, swing, 10.0, margin=0.005, bend=bend)
-    angles = stroke.joints(ROBOT, time)
+    angles = Stroke(0.1, 0.5, swing, 10.0, margin=0.005, bend=bend).joints(ROBOT, time)
     distance = 0.1 * np.cos(2 * np.pi * time / 0.5) + REACH - 0.1 - 0.005
     theta = -np.pi / 2 * np.cos(2 * np.pi * time / 10) if swing else 0.0
     foot = kinematics.foot_position(ROBOT, angles)
@@ -142,9 +142,7 @@ def test_the_template_is_what_the_lab_commanded(file, stroke, start):
     np.testing.assert_allclose(velocity[rows], commanded[1:-1], atol=1e-4)
 
 
-LEG = load_robot("legv2")
-HIP, KNEE = (dataclasses.replace(j, friction=0.0, damping=0.0) for j in (LEG.hip, LEG.knee))
-FRICTIONLESS = dataclasses.replace(LEG, hip=HIP, knee=KNEE)
+FRICTIONLESS = with_joints(ROBOT, friction=0.0, damping=0.0)
 
 
 def mujoco_torque(q, qd, qdd, climb, force):
@@ -184,6 +182,6 @@ def test_a_motion_needs_mujocos_torques_and_the_ground_never_pulls(rig, seed):
 
 def test_friction_and_damping_oppose_the_motion():
     motion = np.array([0.3, -1.0]), np.array([2.0, -3.0]), np.zeros(2)
-    real, ideal = (inverse_dynamics(robot, "fixed-base", *motion) for robot in (LEG, FRICTIONLESS))
-    expected = LEG.of_joints("friction") * [1, -1] + LEG.of_joints("damping") * motion[1]
+    real, ideal = (inverse_dynamics(r, "fixed-base", *motion) for r in (ROBOT, FRICTIONLESS))
+    expected = ROBOT.of_joints("friction") * [1, -1] + ROBOT.of_joints("damping") * motion[1]
     np.testing.assert_allclose(real - ideal, expected)

@@ -23,7 +23,6 @@ def driven(table, **changes):
 
 
 HIP = PAIRS["position"][0]
-PENDULUM = {"robot": "doublependulum"}
 
 
 @settings(max_examples=10)
@@ -36,7 +35,7 @@ def test_an_angle_that_wraps_goes_on(speed, start, side):
         hip_velocity_rad_s=side * speed + 0 * t,
         hip_position_command_rad=true,
     )
-    recording = load(table, **PENDULUM)
+    recording = load(table, robot="doublependulum")
     wraps = np.ptp(np.floor((true + np.pi) / (2 * np.pi))) > 0
     assert any("wraps" in warning for warning in recording.warnings) == wraps
     shown = recording.array("position")[:, 0]

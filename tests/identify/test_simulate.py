@@ -106,8 +106,7 @@ RUN = record(LEG, swing(3.0))
 
 
 def test_windows_tile_a_recording_and_a_part_says_which_seconds_it_is():
-    windows = cut([RUN], 0.5)
-    rows = [r for w in windows for r in range(w.start, w.start + w.length)]
+    rows = [r for w in cut([RUN], 0.5) for r in range(w.start, w.start + w.length)]
     assert rows == list(range(len(RUN)))
     (window,) = cut([RUN], unscored=0.1)
     assert (window.start, window.length, window.unscored) == (0, 600, 20)

@@ -1,35 +1,28 @@
 """Random legs and postures for property tests."""
 
-import dataclasses
-
 import mujoco
 import numpy as np
 from hypothesis import strategies as st
 
-from hopping_leg.robot import Robot, load_robot
+from hopping_leg.io import replace_at
+from hopping_leg.robot import JOINTS, Robot, load_robot
 
 SEEDS = st.integers(0, 2**32 - 1)
 
 
 def random_robot(rng: np.random.Generator) -> Robot:
     """Return legv2 with every mass, length and inertia drawn anew."""
+    numbers = {"base.mass": rng.uniform(0.2, 5)}
+    for link in ("thigh", "shank"):
+        length = numbers[f"{link}.length"] = rng.uniform(0.05, 0.6)
+        numbers[f"{link}.mass"] = rng.uniform(0.05, 3)
+        numbers[f"{link}.com"] = rng.uniform(0.01, 1) * length
+        numbers[f"{link}.inertia"] = 10 ** rng.uniform(-4.5, -1)
+    numbers |= {f"{joint}.armature": 10 ** rng.uniform(-5, -2) for joint in JOINTS}
     robot = load_robot("legv2")
-    base = dataclasses.replace(robot.base, mass=rng.uniform(0.2, 5))
-    links = {}
-    for name in ("thigh", "shank"):
-        length = rng.uniform(0.05, 0.6)
-        links[name] = dataclasses.replace(
-            getattr(robot, name),
-            length=length,
-            mass=rng.uniform(0.05, 3),
-            com=rng.uniform(0.01, 1) * length,
-            inertia=10 ** rng.uniform(-4.5, -1),
-        )
-    joints = {
-        name: dataclasses.replace(getattr(robot, name), armature=10 ** rng.uniform(-5, -2))
-        for name in ("hip", "knee")
-    }
-    return dataclasses.replace(robot, base=base, **links, **joints)
+    for path, number in numbers.items():
+        robot = replace_at(robot, path, number)
+    return robot
 
 
 def random_state(rng: np.random.Generator, count: int = 1):

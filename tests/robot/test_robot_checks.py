@@ -1,4 +1,3 @@
-import dataclasses
 import logging
 import math
 
@@ -8,6 +7,7 @@ from hypothesis import strategies as st
 
 from hopping_leg import cli
 from hopping_leg.errors import RobotError
+from hopping_leg.io import replace_at
 from hopping_leg.robot import doubts, load_robot, load_tree, numbers, shipped_robots
 from tests.robot.files import written
 
@@ -117,8 +117,7 @@ def test_a_weight_beyond_a_links_end_needs_a_word(tmp_path):
     assert doubts(extended) == []
     assert load_robot(extended).shank.com == 0.16
     plain = load_robot("legv2")
-    link = dataclasses.replace(plain.shank, extent=0.2)
-    assert dataclasses.replace(plain, shank=link).digest == plain.digest
+    assert replace_at(plain, "shank.extent", 0.2).digest == plain.digest
 
 
 def test_a_command_says_doubts_once_on_stderr_and_check_says_them_all(tmp_path, caplog, capsys):

@@ -180,11 +180,7 @@ def test_a_height_sensor_tells_the_height_that_it_reads():
 
 
 def test_a_limit_may_be_what_the_hardware_holds(tmp_path):
-    most = {
-        "watchdog": (0.1, "s"),
-        "temperature_limit": (75.0, "deg C"),
-        "voltage_high": (46.0, "V"),
-    }
+    most = {"watchdog": (0.1, "s"), "temperature_limit": (75.0, "deg C"), "voltage_high": (46, "V")}
     numbers = {f"hardware.{name}": entry for name, entry in most.items()}
     load_robot(written(tmp_path / "leg.toml", numbers, "legv2"))
 

@@ -5,7 +5,8 @@ import pytest
 
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.hop_detection import COLUMNS, find_hops
-from hopping_leg.robot import GroundMismatch, load_robot
+from hopping_leg.io import replace_at
+from hopping_leg.robot import load_robot
 from hopping_leg.viewer.live_leg import LiveSettings, LiveSimulation, default_settings
 
 ROBOT = "legv2-paper"
@@ -110,9 +111,7 @@ def test_settings_begin_as_the_robot_has_them_and_change_the_ground_of_reality_t
     live.set_settings(dataclasses.replace(live.settings, payload=0.5))
     live.begin(live.names, "legv2")
     assert live.settings == default_settings(load_robot("legv2"))
-    robot = load_robot("twin")
-    own = dataclasses.replace(robot.reality, ground=GroundMismatch(time_constant=0.08))
-    robot = dataclasses.replace(robot, reality=own)
+    robot = replace_at(load_robot("twin"), "reality.ground.time_constant", 0.08)
     assert default_settings(robot).time_constant == 0.08
     changed = LiveSettings(time_constant=0.03).apply(robot)
     assert changed.reality.ground.time_constant == changed.contact.time_constant == 0.03

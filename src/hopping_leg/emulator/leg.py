@@ -5,15 +5,14 @@ keep. A latency of commands in ``[reality]`` is left to the wire, as drives act 
 without it.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.deploy.drive_link import joint_transforms
+from hopping_leg.io import replace_at
 from hopping_leg.robot import model as robot_model
 from hopping_leg.robot.model_mismatch import STANDING_NOISE, SensorMismatch
-from hopping_leg.robot.parameters import Joint, Robot
+from hopping_leg.robot.parameters import JOINTS, Robot
 from hopping_leg.sim import LegSimulator
 
 TIMESTEP = 5e-4  # Period of the drives' control, s; the physics steps more often within it
@@ -30,15 +29,13 @@ class EmulatedLeg:
     def __init__(self, robot: Robot, q: Array, seed: int) -> None:
         self.transforms = joint_transforms(robot)
         self.wiring = [1.0, 1.0]  # Joint angles as the drives believe them over the true ones
-        free = replace(robot, hip=_unlimited(robot.hip), knee=_unlimited(robot.knee))
-        immediate = replace(robot.reality.latency, command=0.0, jitter=0.0)
-        drives = zip((robot.reality.hip, robot.reality.knee), STANDING_NOISE, strict=True)
-        hip, knee = (
-            replace(drive, sensor=noise) if drive.sensor == SensorMismatch() else drive
-            for drive, noise in drives
-        )
-        reality = replace(robot.reality, latency=immediate, hip=hip, knee=knee)
-        free = replace(free, reality=reality)
+        free = replace_at(robot, "reality.latency.command", 0.0)
+        free = replace_at(free, "reality.latency.jitter", 0.0)
+        for joint, noise in zip(JOINTS, STANDING_NOISE, strict=True):
+            peak = getattr(robot, joint).motor.peak_torque
+            free = replace_at(free, f"{joint}.motor.torque_limit", peak)
+            if getattr(robot.reality, joint).sensor == SensorMismatch():
+                free = replace_at(free, f"reality.{joint}.sensor", noise)
         self._legs = LegSimulator(
             free, 1, rate=1 / TIMESTEP, timestep=robot_model.TIMESTEP, threads=1
         )
@@ -81,7 +78,3 @@ class EmulatedLeg:
         wires = zip(self.transforms, self.wiring, motor_torque, strict=True)
         torques = [wire.joint_torque(torque) * ratio for wire, ratio, torque in wires]
         self._legs.step(np.array([torques]))
-
-
-def _unlimited(joint: Joint) -> Joint:
-    return replace(joint, motor=replace(joint.motor, torque_limit=joint.motor.peak_torque))

@@ -91,8 +91,7 @@ def recording_of(
     table = trace.table.with_columns(interpolated("height_m")).filter(played)
     if not table.height:
         raise RecordingError(f"{name} ended before the excitation began; see its events.")
-    first = float(table["time_s"][0])
-    time = np.round(table["time_s"].to_numpy() - first, 9)
+    time = np.round(table["time_s"].to_numpy() - float(table["time_s"][0]), 9)
     source = f"motors on {trace.header.get('transport')}, {trace.header.get('started')}"
     run = {k: v for k, v in trace.header.items() if k != "events"}
     table = table.select(pl.Series("time_s", time), *columns)
