@@ -175,6 +175,17 @@ def test_what_cannot_be_read_is_said_with_what_was_found(tmp_path, text, names, 
     assert sentence in str(error.value)
 
 
+def test_an_inertia_that_no_mass_has_is_told_with_what_makes_it_one(tmp_path):
+    inertia = 'ixx="0.0012629" iyy="{}" izz="{}" ixy="0" ixz="0" iyz="0"'
+    text = LEG.replace(inertia.format("0.0012629", "1e-9"), inertia)
+    with pytest.raises(RobotError, match=r": 'thigh' has 0\.0001, 0.*, 0\.00146 \(add ") as error:
+        imported(tmp_path / "leg.urdf", text.format("0.00146", "0.0001"))
+    assert "shank" not in str(error.value)
+    more = float(str(error.value).partition("add ")[2].partition(")")[0])
+    text = text.replace("0.0012629", repr(0.0012629 + more), 1)
+    imported(tmp_path / "leg.urdf", text.format(0.00146 + more, 0.0001 + more))
+
+
 def test_missing_numbers_are_named_with_the_option_that_gives_them(tmp_path):
     with pytest.raises(RobotError, match=r"hip.motor.gear_ratio.*--motor qdd100.*--set motor"):
         made(tmp_path / "leg.urdf", EXAMPLE, ())

@@ -73,7 +73,12 @@ class Description:
             with warnings.catch_warnings(action="ignore"):  # of what is deprecated
                 self.model = spec.compile()
         except (ValueError, LookupError, Xml.ParseError, mujoco.FatalError) as error:
-            raise RobotError(f"{path} is no model that MuJoCo reads: {one_line(error)}.") from error
+            said = f"{path} is no model that MuJoCo reads: {one_line(error)}."
+            if "A + B >= C" in said:
+                said = f"{path}: one principal moment of inertia exceeds the others' sum, kg m2:"
+                said += f" {', '.join(_impossible_inertias(spec))}; export them with more digits,"
+                said += " or add as much to each of ixx, iyy and izz."
+            raise RobotError(said) from error
         self.weightless = {*np.flatnonzero(shaped).tolist()} - {*self.heavy(range(len(shaped)))}
         """Bodies of no mass for which the file has an inertia or a shape."""
         self.data = mujoco.MjData(self.model)
@@ -157,6 +162,16 @@ class Description:
 
 def _needs_file(geom: mujoco.MjsGeom) -> bool:
     return geom.type in _OF_FILES or bool(geom.meshname)
+
+
+def _impossible_inertias(spec: mujoco.MjSpec) -> Iterator[str]:
+    """Yield the bodies whose inertia no mass has, and what to add to its principal moments."""
+    for body in spec.bodies:
+        xx, yy, zz, xy, xz, yz = body.fullinertia
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        small, middle, large = np.linalg.eigvalsh(np.diag(body.inertia) if np.isnan(xx) else tensor)
+        if (gap := large - middle - small) > 0:
+            yield f"'{body.name}' has {small:.4g}, {middle:.4g}, {large:.4g} (add {1.01 * gap:.3g})"
 
 
 def _leave_out(spec: mujoco.MjSpec) -> None:

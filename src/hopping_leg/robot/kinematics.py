@@ -76,19 +76,15 @@ def joint_angles(robot: Geometry, foot: Array) -> Array:
 
 def jacobian(robot: Geometry, q: Array) -> Array:
     """Return d(x_down, y)/d(q1, q2), m/rad, (..., 2, 2)."""
-    thigh, shank = robot.thigh.length, robot.shank.length
-    q1, q12 = q[..., 0], q[..., 0] + q[..., 1]
-    thigh_down, thigh_forward = -thigh * np.sin(q1), thigh * np.cos(q1)
-    shank_down, shank_forward = -shank * np.sin(q12), shank * np.cos(q12)
-    down = np.stack([thigh_down + shank_down, shank_down], axis=-1)
-    forward = np.stack([thigh_forward + shank_forward, shank_forward], axis=-1)
+    foot, q12 = foot_position(robot, q), q[..., 0] + q[..., 1]
+    down = np.stack([-foot[..., 1], -robot.shank.length * np.sin(q12)], axis=-1)
+    forward = np.stack([foot[..., 0], robot.shank.length * np.cos(q12)], axis=-1)
     return np.stack([down, forward], axis=-2)
 
 
 def foot_velocity(robot: Geometry, q: Array, qd: Array) -> Array:
     """Return the foot's velocity in the hip's frame, (x_down, y) rates, m/s, (..., 2)."""
-    velocity: Array = np.einsum("...ij,...j->...i", jacobian(robot, q), qd)
-    return velocity
+    return np.asarray(np.einsum("...ij,...j->...i", jacobian(robot, q), qd))
 
 
 def stance_height(robot: Geometry, q: Array) -> Array:

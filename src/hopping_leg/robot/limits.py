@@ -27,8 +27,7 @@ def braking_times(robot: Robot, rate: float) -> Array:
     """
     inertia = np.diag(dynamics.mass_matrix(robot, np.zeros(2)))[1:]
     _, _, slope = _torque_speed_line(robot)
-    time: Array = 1 / rate + inertia / slope
-    return time
+    return np.asarray(1 / rate + inertia / slope)
 
 
 def command_limits(robot: Robot) -> tuple[float, float]:

@@ -66,15 +66,11 @@ def get_spec(
     floor.solref = [robot.contact.time_constant, robot.contact.damping_ratio]
     floor.friction[0] = robot.contact.friction
     floor.contype, floor.conaffinity = 0 if fixed_base else 1, 0
-    for name in ("base", "knee_cap", "foot"):
-        geom = spec.geom(name)
-        geom.contype, geom.conaffinity = 0, 1
     for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
         limit = joint.motor.torque_limit
         actuator = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         actuator.set_to_motor()
         actuator.gear[0] = joint.belt_ratio
-        actuator.ctrllimited = True
         actuator.ctrlrange = [-limit, limit]
     if fixed_base:
         spec.delete(spec.joint("rail"))
@@ -92,13 +88,10 @@ def build_model(robot: Robot, timestep: float = TIMESTEP) -> mujoco.MjModel:
 
 def _set_link(spec: mujoco.MjSpec, name: str, link: Link, joint: Joint) -> None:
     _set_inertia(spec.body(name), link.mass, -link.com, link.inertia)
-    geom = spec.geom(name)
-    geom.fromto = [0, 0, 0, 0, 0, -link.length]
-    geom.size[0] = 0.012
+    spec.geom(name).fromto = [0, 0, 0, 0, 0, -link.length]
     axis = spec.joint("hip" if name == "thigh" else "knee")
     _set_friction(axis, joint)
     axis.armature = joint.armature
-    axis.limited = mujoco.mjtLimited.mjLIMITED_TRUE
     axis.range = [joint.stop_lower, joint.stop_upper]
     axis.solref_limit = [STOP_TIME_CONSTANT, 1.0]
     axis.solimp_limit = STOP_IMPEDANCE

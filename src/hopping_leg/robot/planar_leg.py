@@ -84,7 +84,8 @@ def read_leg(
     found["hip"], hip_angle = _joint(tree, upper, normal, thigh, -np.pi)
     found["knee"], knee_angle = _joint(tree, lower, normal, direction - thigh, -1.5 * np.pi)
     if base := tree.heavy(moving - leg):
-        found["base"]["mass"] = float(tree.model.body_mass[base].sum()), _said(tree, base)
+        mass, said = tree.model.body_mass[base].sum(), " + ".join(map(tree.body, base))
+        found["base"]["mass"] = float(mass), said
     below = (tree.joint(lower), f"'{tip.name}'")
     for i, (name, lump) in enumerate((("thigh", leg - shank), ("shank", shank))):
         length = float(np.linalg.norm(lines[i])), f"{tree.joint(joints[i])} to {below[i]}"
@@ -274,14 +275,10 @@ def _link(
     own += float(masses @ np.sum((coms - com) ** 2, axis=1))
     length, across_line = np.linalg.norm(line), np.array([-line[1], line[0]])
     along, beside = float(com @ line / length), float(com @ across_line / length)
-    said = _said(tree, bodies)
+    said = " + ".join(map(tree.body, bodies))
     left = f"; {1e3 * abs(beside):.2g} mm beside the line are left out"
     return {
         "mass": (mass, said),
         "com": (along, f"{said}, along the link{left if abs(beside) > 1e-6 else ''}"),
         "inertia": (own + mass * beside**2, f"{said}, about the centre of mass"),
     }
-
-
-def _said(tree: Description, bodies: list[int]) -> str:
-    return " + ".join(tree.body(i) for i in bodies)
