@@ -43,7 +43,8 @@ def test_the_native_form_keeps_everything(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("mark", "comment"), [(",", ""), (";", "# leg 2"), ("\t", "# leg, 2"), (", ", "")]
+    ("mark", "comment"),
+    [(",", ""), (";", "# leg 2"), ("\t", "# leg, 2"), (", ", ""), ("   ", "# leg,  2")],
 )
 def test_every_form_of_a_table_reads_the_same(tmp_path, mark, comment):
     path = write_run(tmp_path, swinging())

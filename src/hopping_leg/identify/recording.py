@@ -168,7 +168,7 @@ def _read(path: Path, origin: str) -> tuple[pl.DataFrame, dict[str, Any], str]:
 
 
 def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
-    """Return a table from text, plain or gzip, with comma, semicolon or tab between its fields.
+    """Return a table from text, plain or gzip, with comma, semicolon, tab or blanks between fields.
 
     Columns of numbers, true and false are floats, empty fields null; lines after a # are skipped.
     """
@@ -177,9 +177,12 @@ def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
             content = gzip.decompress(content)
         if b"\0" in content:
             raise OSError("it holds zero bytes, as UTF-16, archives and torn files do")
-        unquoted = re.sub(rb'"[^"\n]*"', b"", content.removeprefix(b"\xef\xbb\xbf"))
-        lines = [n for n in unquoted.splitlines() if n.strip() and n[:1] != b"#"]
-        mark = next((m for m in b"\t;" if m in b"".join(lines[:1])), ord(","))
+        unquoted = re.sub(rb'"[^"\n]*"', b'""', content.removeprefix(b"\xef\xbb\xbf"))
+        lines = [n.strip(b" ") for n in unquoted.splitlines() if n.strip() and n[:1] != b"#"]
+        mark = next((m for m in b"\t;, " if m in b"".join(lines[:1])), ord(","))
+        if mark == ord(" "):
+            content = b"\n".join(b" ".join(n.split()) for n in content.splitlines())
+            lines = [b" ".join(n.split()) for n in lines]
         fields = [n.count(mark) for n in lines]
         if fields[1:] and fields[0] not in fields[1:]:
             raise RecordingError(
