@@ -114,7 +114,7 @@ def test_a_recurrent_policy_remembers(tmp_path):
 
     check(hopping_leg.export_policy(model, tmp_path / "a.onnx"), predict)
     model.save(tmp_path / "a.zip")
-    with pytest.raises(PolicyError, match=r"lstm.*export_policy"):
+    with pytest.raises(PolicyError, match=r"\(it has an LSTM\); load it and use `hop.*export_pol"):
         load_controller(tmp_path / "a.zip", LEG)
 
 

@@ -194,6 +194,7 @@ def _read_sb3(content: bytes, origin: str, size: int) -> Actor:
             name = told["activation_fn"].strip("<>'").split(".")[-1]
             options["activation_fn"] = getattr(nn, name)
         own = [name for name in told if "features_extractor" in name]
+        own += ["an LSTM"] * any("lstm" in name for name in weights)
         if own or sum(1 + int(n) for n in re.findall(r"\d+", str(options))) > _WIDEST:
             raise PolicyError(f"it has {', '.join(own) or 'too many neurons'}")
         on_policy = "action_net.weight" in weights
@@ -205,10 +206,11 @@ def _read_sb3(content: bytes, origin: str, size: int) -> Actor:
         named = {n.removeprefix(at): w for n, w in weights.items() if n.startswith(at)}
         actor.load_state_dict(named)
     except Exception as error:  # zipfile, json and torch raise many unrelated types
+        made = f"say in {Path(origin).with_suffix('.toml')} what the environment was made with, or "
         raise PolicyError(
             f"{origin} is not read as an actor of stable-baselines3 from {size} observations to two"
-            f" actions ({one_line(error)}); say in {Path(origin).with_suffix('.toml')} what the"
-            " environment was made with, or load it and use `hopping_leg.export_policy`."
+            f" actions ({one_line(error)}); {made if 'size mismatch' in str(error) else ''}load it"
+            " and use `hopping_leg.export_policy`."
         ) from error
     return _Model(actor)
 
