@@ -210,3 +210,9 @@ def test_what_cannot_be_the_leg_is_refused_before_any_fit(names, change, onboard
     wrong = changed(tracked(), change(columns)).with_metadata(onboard=onboard)
     with pytest.raises(RecordingError, match=sentence):
         identify([wrong], LEG, options=options())
+
+
+def test_a_knee_whose_angle_counts_from_the_vertical_is_told():
+    columns = (pl.col(PAIRS[name][1]) + pl.col(PAIRS[name][0]) for name in TURNED)
+    with pytest.raises(RecordingError, match="if the line that the knee's angle counts from"):
+        identify([changed(tracked(), *columns)], LEG, options=options())

@@ -105,8 +105,7 @@ def _parabolas(recording: Recording, values: Array, half: float) -> Array:
     first = np.clip(np.arange(len(time)) - half, 0, len(time) - 2 * half - 1)
     rows = first[:, None] + np.arange(2 * half + 1)
     t = (time[rows] - time[:, None])[..., None] ** np.arange(3)
-    found: Array = np.linalg.pinv(t) @ values[rows]
-    return found
+    return np.asarray(np.linalg.pinv(t) @ values[rows])
 
 
 def _falling(recording: Recording, robot: Robot) -> tuple[float, float]:

@@ -91,17 +91,18 @@ def identify(
 
 
 _RIGHT = ((1, 1), (1, 1), (0, 0))
-_MISTAKES = {
+_MISTAKES: dict[str, list[tuple[Pair, ...]]] = {
     "the sign of hip or knee, with its angle, velocity, torque and commands": [
         ((1, -1), (1, -1), (0, 0))
     ],
     "the sign of the hip's torque": [((1, 1), (-1, 1), (0, 0))],
     "the sign of the knee's torque": [((1, 1), (1, -1), (0, 0))],
+    "the line that the knee's angle counts from (the vertical?)": [(*_RIGHT, (0, 1))],
     "the zero of hip or knee, by quarter turns,": [
         ((1, 1), (1, 1), turns) for n in (-1, 1, 2) for turns in ((n, 0), (0, n))
     ],
 }
-"""Factors of angles and torques, and quarter turns of angles, hip and knee, that undo a mistake."""
+"""Factors of angles and torques, quarter turns, shares of the hip's angle that undo a mistake."""
 _TURN = 2 * np.pi
 _SOON = 0.2  # s, over which the robot to start from predicts well enough to tell
 _BETTER, _TOLD = 1.8, 0.5
@@ -129,17 +130,17 @@ def _check_conventions(recording: Recording, start: LegHypothesis) -> None:
 
 def _unexplained(driven: Recording, start: LegHypothesis, *convention: Pair) -> float:
     """Return the share of the motion that its torques do not predict, infinite if unknown."""
-    (angles, torques, turns), changes = convention, []
+    (angles, torques, turns, *held), changes = convention, []
     for joint in range(2):
         for name in ("position", "velocity", "position_estimate", "velocity_estimate"):
             shift = turns[joint] * np.pi / 2 if name.startswith("position") else 0.0
-            changes.append(pl.col(PAIRS[name][joint]) * angles[joint] + shift)
+            hips = pl.col(PAIRS[name][0]) if joint and held else 0.0
+            changes.append(pl.col(PAIRS[name][joint]) * angles[joint] + shift - hips)
         changes.append(pl.col(PAIRS["torque_command"][joint]) * torques[joint])
+    spread = np.nanstd(driven.array("position") * np.abs(angles), axis=0)
     table = driven.trace.table
-    table = table.with_columns(c for c in changes if c.meta.root_names()[0] in table.columns)
-    driven = driven.with_table(table)
-    errors = np.array(validation.open_loop([driven], start, _SOON))
-    spread = np.nanstd(driven.array("position"), axis=0)
+    table = table.with_columns(c for c in changes if {*table.columns} >= {*c.meta.root_names()})
+    errors = np.array(validation.open_loop([driven.with_table(table)], start, _SOON))
     return float(np.nan_to_num(np.sum((errors / np.maximum(spread, 1e-6)) ** 2), nan=np.inf))
 
 

@@ -48,10 +48,8 @@ def play(
     plant.channel.restart(slice(None), legs.measured_q, legs.measured_qd, no_command)
     rows = np.empty((len(excitation), 8))
     for tick, row in enumerate(rows):
-        row[:6] = np.concatenate(
-            [legs.measured_q, legs.measured_qd, legs.measured_torque], axis=None
-        )
-        row[6:] = legs.height[0], legs.foot_clearance()[0]
+        told = (legs.measured_q, legs.measured_qd, legs.measured_torque, legs.height)
+        row[:] = np.concatenate([*told, legs.foot_clearance()], axis=None)
         plant.drive(controller.act(plant.sense(no_command)))
         if on_tick is not None:
             on_tick(tick + 1, len(excitation))
@@ -84,8 +82,7 @@ def recording_of(
     recording is filed under. RecordingError says that it was not played.
     """
     columns = (*MEASURED, *TARGETS, "height_m")
-    lacking = [column for column in columns if column not in trace.table.columns]
-    if lacking:
+    if lacking := [column for column in columns if column not in trace.table.columns]:
         raise RecordingError(f"{name} has no column '{lacking[0]}'; no excitation was played.")
     played = pl.col(TARGETS[0]).is_finite()
     table = trace.table.with_columns(interpolated("height_m")).filter(played)
