@@ -65,6 +65,21 @@ def test_prediction_is_the_ballistic_apex(reward):
     assert term(reward, "predicted", 0.2, rate, clearance=0.0) == 0.0
 
 
+def test_power_costs_as_much_braking_as_driving_and_only_later_in_training():
+    reward = make(ApexRewardConfig(power=0.5))
+    driving, braking = (
+        term(reward, "power", torque=(4.0, torque), qd=(-1.0, 5.0)) for torque in (6.0, -6.0)
+    )
+    robot = load_robot("legv2-paper")
+    length = robot.thigh.length + robot.shank.length
+    assert driving == braking == pytest.approx(34 / (robot.mass * 9.81 * np.sqrt(9.81 * length)))
+    busy, idle = transition(torque=(4.0, 6.0), qd=(1.0, 5.0)), transition(qd=(1.0, 5.0))
+    for share, price in ((0.0, 0.0), (0.25, 0.25), (1.0, 0.5)):
+        reward.anneal(share)
+        cost = reward(idle)[0] - reward(busy)[0]
+        assert cost == pytest.approx(CONFIG.scale * price * driving)
+
+
 def test_energy_gain_fades_and_can_end_where_the_hop_would_be_too_high(reward):
     moving, still = transition(0.2, 1.0, clearance=0.0), transition(0.2, 0.0, clearance=0.0)
     (early,), (rest,) = reward(moving)[0], reward(still)[0]

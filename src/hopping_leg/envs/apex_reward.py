@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
+from hopping_leg.controllers import robot_numbers
 from hopping_leg.envs.paper_reward import jerk_term
 from hopping_leg.envs.rewards import LastingTerm, Reward, RewardTerm, Transition, sum_of_joints
 from hopping_leg.robot import Robot, kinematics
@@ -55,6 +56,8 @@ class ApexRewardConfig:
     """Weight of the paper's Pj."""
     effort: float = 0.0
     """Weight of the actions' squares in flight, where they move nothing but the leg itself."""
+    power: float = 0.0
+    """Weight of the motors' |torque x speed| over weight x sqrt(g L), rising like ``reversals``."""
     reversals: float = 0.0
     """Weight of changes of an action's sign by more than 0.2; it rises from none until half of the
     training."""
@@ -83,10 +86,18 @@ def apex_reward(robot: Robot, config: ApexRewardConfig, rate: float) -> Reward:
     def price(first: float, last: float) -> Callable[[float], float]:
         return lambda share: -(first + (last - first) * min(1.0, share / _FULL_PRICE))
 
+    unit = robot.mass * robot_numbers.leg_length(robot) ** 2 / robot_numbers.fall_time(robot) ** 3
+
+    def power(t: Transition) -> Array:
+        return sum_of_joints(np.abs(t.torque * t.qd)) / unit
+
     def reversals(t: Transition) -> Array:
         turned = t.action * t.last_action < 0
         far = np.abs(t.action - t.last_action) > _REVERSAL
         return sum_of_joints((turned & far).astype(np.float64))
+
+    def speeding(t: Transition) -> Array:
+        return sum_of_joints(np.maximum(np.abs(t.qd) - _SPEED, 0.0))
 
     def excess(t: Transition) -> Array:
         return sum_of_joints(np.maximum(lower - t.q, 0.0) + np.maximum(t.q - upper, 0.0))
@@ -108,16 +119,11 @@ def apex_reward(robot: Robot, config: ApexRewardConfig, rate: float) -> Reward:
                 bounded_energy_gain,
             ),
             jerk_term(c.jerk),
-            RewardTerm(
-                "effort", -c.effort, lambda t: sum_of_joints(np.square(t.action)) * t.flying
-            ),
+            RewardTerm("effort", -c.effort, lambda t: sum_of_joints(t.action**2) * t.flying),
+            RewardTerm("power", price(0.0, c.power), power),
             RewardTerm("reversals", price(0.0, c.reversals), reversals),
             RewardTerm("limits", price(*c.limits), excess),
-            RewardTerm(
-                "velocity",
-                -c.velocity,
-                lambda t: sum_of_joints(np.maximum(np.abs(t.qd) - _SPEED, 0.0)),
-            ),
+            RewardTerm("velocity", -c.velocity, speeding),
             RewardTerm("clearance", -c.clearance, ground_closeness),
         ),
         c.scale,

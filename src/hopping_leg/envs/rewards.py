@@ -33,6 +33,8 @@ class Transition:
     """Action of this tick, in [-1, 1], (n, 2)."""
     last_action: Array
     """Action of the tick before, zero at the start of an episode, (n, 2)."""
+    torque: Array
+    """What the motors gave, mean over the tick, N m, (n, 2)."""
     apex: BoolArray
     """Whether the base passed an in-flight apex during the tick, (n,)."""
     apex_height: Array

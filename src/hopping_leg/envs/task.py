@@ -185,8 +185,8 @@ class HoppingTask(Stateful):
         self.applied_torque = self.plant.drive(torque)
         self._columns[:] = legs.state.T
         transition = rewards.Transition(
-            *self._true, command, taken, self.last_action, self._never, self._nan,
-            legs.foot_clearance,
+            *self._true, command, taken, self.last_action, self.applied_torque, self._never,
+            self._nan, legs.foot_clearance,
         )  # fmt: skip
         apex_error = self._find_apexes(transition, height_before)
         reward, terms = self.reward(transition)
