@@ -27,6 +27,12 @@ RESULTS = (
     "energy-shaping --folder runs/legs --jobs 2 --out runs/zero-shot-legs "
     "--json studies/sim_to_real/results/zero_shot_legs.json",
     *(
+        "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping-tuned "
+        f"--twins 20 --seed 8000 --{option} --jobs 2 --out runs/zero-shot-{name} "
+        f"--json studies/sim_to_real/results/zero_shot_{name}.json"
+        for name, option in (("friction", "friction 1.5"), ("weak_hip", "hip-gain 0.49"))
+    ),
+    *(
         "python -m studies.sim_to_real transfer --methods identified-belt identified two-pass cad "
         "table-1 randomised energy-shaping-identified universal universal-identified --seeds 0 1 2 "
         f"--disturbance {noise} --jobs 2 --folder runs/transfer-fast "

@@ -16,7 +16,7 @@ from hopping_leg.controllers.energy_shaping.controller import EnergyShaping
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import NO_MISMATCH, Latency, Robot, load_robot, parent_robot, shipped_robots
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
-from hopping_leg.sim.randomization import draw_twin
+from hopping_leg.sim.randomization import TWIN_RANGES, Range, draw_twin
 
 LEAST_TWINS = 20
 """Twins that an interval over twins needs: with fewer a bootstrap interval is too narrow."""
@@ -42,9 +42,18 @@ class Twin:
         return load_robot(self.source)
 
 
-def drawn_twin(seed: int, folder: Path) -> Twin:
-    """Return a twin that is drawn at random; its robot file is written to a folder."""
-    twin = draw_twin(seed)
+def drawn_twin(seed: int, folder: Path, friction: float = 0.0, hip_gain: float = 1.0) -> Twin:
+    """Return a twin that is drawn at random; its robot file is written to a folder.
+
+    Its joints have so much more ``friction``, N m, than usual, and so many times the hip's gain.
+    """
+
+    def harder(usual: Range) -> Range:
+        more = friction * (usual.path in ("hip.friction", "knee.friction"))
+        factor = hip_gain if usual.path == "reality.hip.torque_gain" else 1.0
+        return replace(usual, low=usual.low * factor + more, high=usual.high * factor + more)
+
+    twin = draw_twin(seed, ranges=list(map(harder, TWIN_RANGES)))
     path = folder / f"{twin.robot.name}.toml"
     if not path.exists() or load_robot(path) != twin.robot:
         twin.save(path)

@@ -184,6 +184,10 @@ class ZeroShot:
     """How many twins to draw."""
     seed: int = 0
     """Seed of the first; each has the next."""
+    friction: float = 0.0
+    """How much more friction both joints of a drawn twin have than usual, N m."""
+    hip_gain: float = 1.0
+    """How many times as much as usual its hip's motor gives of what it is asked for."""
     folder: Path | None = None
     """Take the robot files of this folder instead; those without [reality] are told as they are."""
     commands: Heights = COMMANDS
@@ -249,7 +253,8 @@ class ZeroShot:
     def _sources(self) -> list[str]:
         if self.folder is None:
             seeds = range(self.seed, self.seed + self.twins)
-            return [drawn_twin(seed, self.out / "twins").source for seed in seeds]
+            hard = self.out / "twins", self.friction, self.hip_gain
+            return [drawn_twin(seed, *hard).source for seed in seeds]
         files = sorted(map(str, self.folder.glob("*.toml")))
         if not files:
             raise UsageError(

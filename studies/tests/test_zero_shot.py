@@ -17,6 +17,7 @@ pytest.importorskip("moteus")
 from studies import shared
 from studies.sim_to_real import zero_shot
 from studies.sim_to_real.run import Options
+from studies.sim_to_real.twins import drawn_twin
 from studies.sim_to_real.zero_shot import believed_of, pair, summarize
 
 LEG = load_robot("legv2-identified")
@@ -36,6 +37,15 @@ def test_of_a_twin_what_it_extends_is_told_and_of_another_leg_all(tmp_path):
     draw_leg(3).save(tmp_path / "leg.toml")
     assert believed_of(str(tmp_path / "twin.toml")) == load_robot("legv2")
     assert believed_of(str(tmp_path / "leg.toml")) == draw_leg(3).robot
+
+
+def test_twins_may_rub_more_and_have_a_weak_hip(tmp_path):
+    usual, hard = drawn_twin(3, tmp_path / "a").robot, drawn_twin(3, tmp_path / "b", 1.5, 0.5).robot
+    assert usual == draw_twin(3).robot
+    for joint in ("hip", "knee"):
+        assert 1.5 < getattr(hard, joint).friction < 2.0
+    gains = {leg.reality.hip.torque_gain for leg in (usual, hard)}
+    assert min(gains) == pytest.approx(max(gains) / 2, rel=1e-5)
 
 
 def test_a_leg_that_stands_misses_by_what_it_stands_too_low_and_one_that_hops_by_its_hops():
