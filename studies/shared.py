@@ -34,7 +34,7 @@ Row = dict[str, Any]
 ROOT = Path(__file__).parent.parent
 
 LONGEST = 30  # Numbers of a list in a stored result; what is longer is raw
-NOT_SHOWN = ("groups", "ladder", "neighbours", "sequence")  # Of an evaluation at many heights
+IF_SHOWN = ("groups", "ladder", "neighbours", "sequence")  # Of an evaluation, where a page has it
 
 
 def main(
@@ -105,8 +105,11 @@ def store(file: Path, command: str) -> None:
     if pairs := content.get("pairs"):
         rows = [list(pair.values()) for pair in pairs]
         content["pairs"] = {"columns": list(pairs[0]), "rows": rows}
-    if len(content.get("summary", ())) > 2 * LONGEST:
-        content = {key: entry for key, entry in content.items() if key not in NOT_SHOWN}
+    pages = (*ROOT.glob("docs/*.md"), *ROOT.glob("studies/*/README.md"))
+    shown = "".join(page.read_text(encoding="utf-8") for page in pages)
+    for key in IF_SHOWN:
+        if f'{file.name}", "{key}' not in shown:
+            content.pop(key, None)
     content = condensed({**content, "command": command})
     write_atomically(file, f"{_lines(content)}\n".encode())
 

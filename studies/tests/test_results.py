@@ -53,6 +53,20 @@ def test_what_a_command_reads_an_earlier_one_has_made(name):
         made += written
 
 
+def test_a_price_on_power_makes_every_training_calm():
+    rows = json.loads((ROOT / "studies/evaluation/results/calm.json").read_text())["summary"]
+    hops = {row["controller"]: row for row in rows if row["command_m"] == 0.3}
+    free = [row for name, row in hops.items() if "calm-0.0-" in name]
+    paid = [row for name, row in hops.items() if "calm-0.0-" not in name]
+    energy = max(row["electrical_energy_per_hop_j"] for row in paid)
+    assert len(free) == 2
+    assert len(paid) == 6
+    assert 2 * energy < max(row["electrical_energy_per_hop_j"] for row in free)
+    calmest = min(free, key=lambda row: row["electrical_energy_per_hop_j"])
+    assert calmest["electrical_energy_per_hop_j"] < energy
+    assert calmest["std_m"] < min(row["std_m"] for row in paid)
+
+
 def test_results_are_small():
     files = [p for p in ROOT.glob("studies/*/results/*") if p.is_file()]
     assert sum(path.stat().st_size for path in files) < LARGEST
