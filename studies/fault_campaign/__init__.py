@@ -13,16 +13,13 @@ _LIES = "'dead encoder' 'frozen sample' 'stale samples' 'false torque' 'false ve
 _LIES += " 'swapped replies' 'one id for two' 'fast clock' 'lie and fault'"
 
 RESULTS = (
-    f"{_TRY} --repeats 42 --live 0 --families {_SHOWN}"
+    f"{_TRY} --repeats 21 --live 0 --families {_SHOWN}"
     " --json studies/fault_campaign/results/fault_campaign.json",
     f"{_TRY} --repeats 10 --live 2 --families {_LIVE}"
     " --json studies/fault_campaign/results/real_time.json",
-    *(
-        "python -m studies.fault_campaign --controllers fast energy-shaping universal --live 0"
-        f" --seed {seed} --repeats {repeats} --families {_LIES}"
-        f" --json studies/fault_campaign/results/{name}.json"
-        for name, seed, repeats in (("lies", 11, 372), ("lies_belt", 12, 25))
-    ),
+    "python -m studies.fault_campaign --controllers fast energy-shaping universal --live 0"
+    f" --seed 12 --repeats 60 --families {_LIES}"
+    " --json studies/fault_campaign/results/lies.json",
     "python -m studies.fault_campaign --controllers fast rl universal paper energy-shaping"
     " --live 0 --seed 11 --repeats 50 --families 'no fault'"
     " --json studies/fault_campaign/results/healthy.json",
