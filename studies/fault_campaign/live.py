@@ -94,7 +94,9 @@ def _killed(scene: Scene, emulator: EmulatorProcess, folder: Path) -> Result:
         result.disturbed = True
         return result
     time.sleep(_AFTERWARDS)
-    judge_braking(result, _braked(emulator.log(), result.began))
+    log = emulator.log()
+    result.began = max(result.began, log.commands[-1].time)  # it may have sent one since
+    judge_braking(result, _braked(log, result.began))
     result.problems += problems_of_box(folder)
     return result
 
