@@ -78,8 +78,7 @@ class EnergyShaping:
         posture_rate = way * kinematics.smooth_step_rate(share) / lasts
         flying = self._stiffness * (posture - leg.q) + self._damping * (posture_rate - leg.qd)
         self._end_flight(leg, posture_rate, flying, command)
-        thrown = equations.ballistic_height(self._liftoff_height, self._liftoff_rate, self._clock)
-        self._height = np.where(self._phase == Phase.FLIGHT, thrown, leg.stand)
+        self._estimate_height(leg)
         push = self._force(leg, command, liftoff, landing)
         side = -gains.kp_y * leg.y - gains.kd_y * leg.y_rate
         force = np.stack([push, side], axis=-1)  # on the ground, and forwards, N
@@ -161,6 +160,11 @@ class EnergyShaping:
         """Put legs into a phase that began ``since`` seconds ago, (n,)."""
         self._phase = np.where(who, phase, self._phase)
         self._clock = np.where(who, since, self._clock)
+
+    def _estimate_height(self, leg: LegView) -> None:
+        start, clock = self._liftoff_height, self._clock
+        flying = equations.ballistic_height(start, self._liftoff_rate, clock)
+        self._height = np.where(self._phase == Phase.FLIGHT, flying, leg.stand)
 
     # What the paper's own law, or a study that asks the simulator, does otherwise.
 
