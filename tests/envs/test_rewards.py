@@ -119,7 +119,7 @@ def test_every_term_is_as_printed(height, rate, q, qd, command, action, last):
     barrier = math.exp(height - command) if height >= command else 0.0
     jerk = sum((a - b) ** 2 for a, b in zip(action, last, strict=True))
     position = sum(
-        math.exp(-10 * (x - low)) + math.exp(10 * (x - high)) if low <= x <= high else 1.0
+        min(math.exp(-10 * (x - low)) + math.exp(10 * (x - high)), 1.0)
         for x, low, high in zip(q, LOWER, UPPER, strict=True)
     )
     velocity = sum(v**2 - m**2 if abs(v) > m else 0.0 for v, m in zip(qd, SPEED, strict=True))
