@@ -97,7 +97,8 @@ def run_results(name: str) -> int:
 def store(file: Path, command: str) -> None:
     """Rewrite a result as it is stored: with its command, without raw numbers, a line a record.
 
-    ``pairs`` are stored without the names of their entries, which ``columns`` has once.
+    ``pairs`` are stored without the names of their entries, which ``columns`` has once, and the
+    lists of ``IF_SHOWN`` where a page shows them.
     """
     content = json.loads(file.read_text(encoding="utf-8"))
     if isinstance(content.get("trials"), list) and len(content["trials"]) > 2 * LONGEST:
@@ -108,7 +109,7 @@ def store(file: Path, command: str) -> None:
     pages = (*ROOT.glob("docs/*.md"), *ROOT.glob("studies/*/README.md"))
     shown = "".join(page.read_text(encoding="utf-8") for page in pages)
     for key in IF_SHOWN:
-        if f'{file.name}", "{key}' not in shown:
+        if f'{file.parents[1].name}/{file.name}", "{key}' not in shown:
             content.pop(key, None)
     content = condensed({**content, "command": command})
     write_atomically(file, f"{_lines(content)}\n".encode())

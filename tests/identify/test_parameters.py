@@ -47,7 +47,7 @@ def test_only_the_sum_of_armature_and_inertia_is_identifiable():
     goal = objective(parameters, recordings=[run])
     noise = np.random.default_rng(0).normal(size=goal.groups.size)
     slopes = jacobian(goal.residuals, np.zeros(3), parameters.bounds)
-    known = identifiability(parameters, np.zeros(3), noise, slopes)
+    known = identifiability(parameters, np.zeros(3), noise, slopes, 0 * noise)
     assert abs(known.correlation[1, 2]) > 0.99
     assert any("hip.armature" in s and "thigh.inertia" in s for s in known.statements)
     assert not any("hip.friction" in s for s in known.statements)
@@ -60,7 +60,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say():
     for _ in range(300):
         noise = rng.normal(size=200)
         vector = np.linalg.lstsq(slopes, noise, rcond=None)[0]
-        known = identifiability(TWO, vector, noise - slopes @ vector, slopes)
+        known = identifiability(TWO, vector, noise - slopes @ vector, slopes, 0 * noise)
         covered += int((np.abs(known.values - TWO.start) <= known.half_width).sum())
     assert 0.91 < covered / 600 < 0.99
 
@@ -85,7 +85,8 @@ def test_draws_vary_together_as_the_data_and_another_friction_law_let_them():
 def test_what_the_data_do_not_touch_is_said():
     slopes = np.zeros((50, 2))
     slopes[:, 0] = 1.0
-    known = identifiability(TWO, np.ones(2), np.random.default_rng(0).normal(size=50), slopes)
+    noise = np.random.default_rng(0).normal(size=50)
+    known = identifiability(TWO, np.ones(2), noise, slopes, 0 * noise)
     assert known.half_width[1] == np.inf
     assert "These data say nothing about 'knee.friction'." in known.statements
 

@@ -41,11 +41,7 @@ class Identifiability:
 
 
 def identifiability(
-    parameters: ParameterSet,
-    vector: Array,
-    residuals: Array,
-    jacobian: Array,
-    change: Array | float = 0.0,
+    parameters: ParameterSet, vector: Array, residuals: Array, jacobian: Array, change: Array
 ) -> Identifiability:
     """Judge a fit by its best search vector (k,), residuals there (m,) and their slopes (m, k).
 
@@ -64,7 +60,7 @@ def identifiability(
     scale = np.where(deviation > 0, deviation, 1.0)
     correlation = covariance / np.outer(scale, scale)
     np.fill_diagonal(correlation, 1.0)
-    shift = covariance @ (jacobian.T @ (change + 0 * residuals)) / max(variance, 1e-300)
+    shift = covariance @ (jacobian.T @ change) / max(variance, 1e-300)
     half = _NINETY_FIVE * deviation + np.abs(shift)
     total = covariance + np.outer(shift, shift) / _NINETY_FIVE**2
     unit = parameters.scale_at(vector)

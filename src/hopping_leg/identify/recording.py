@@ -182,16 +182,15 @@ def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
         mark = next((m for m in b"\t;, " if m in b"".join(lines[:1])), ord(","))
         if mark == ord(" "):
             content = b"\n".join(b" ".join(n.split()) for n in content.splitlines())
-            lines = [b" ".join(n.split()) for n in lines]
-        fields = [n.count(mark) for n in lines]
+        fields = [len(n.split(None if mark == ord(" ") else bytes([mark]))) for n in lines]
         if fields[1:] and fields[0] not in fields[1:]:
             raise RecordingError(
-                f"{origin}: its rows have {fields[1] + 1} fields, all others than the"
-                f" {fields[0] + 1} names of its header; name every field, and nothing else, there."
+                f"{origin}: its rows have {fields[1]} fields, all others than the"
+                f" {fields[0]} names of its header; name every field, and nothing else, there."
             )
         if short := [row for row, count in enumerate(fields, -1) if count < fields[0]]:
             raise RecordingError(
-                f"{origin}: row {short[0]} has fewer fields than the {fields[0] + 1} of the"
+                f"{origin}: row {short[0]} has fewer fields than the {fields[0]} of the"
                 " header, as a killed logger leaves it; delete the row."
             )
         texts = pl.read_csv(content, separator=chr(mark), comment_prefix="#", infer_schema=False)

@@ -1,6 +1,6 @@
 """A live simulation of one leg, or two side by side, that follow commands while they hop."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from hopping_leg.controllers import command_schedule, registry
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.errors import UsageError
+from hopping_leg.io import replace_at
 from hopping_leg.robot import Robot, SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, LegSimulator, Measurement, NoiseAndDelay, Plant
 from hopping_leg.sim.leg_simulator import IMPOSSIBLE_SPEED
@@ -38,16 +39,12 @@ class LiveSettings:
 
     def apply(self, robot: Robot) -> Robot:
         """Return the robot with these settings."""
-        latency, ground = robot.reality.latency, robot.reality.ground
-        if ground.time_constant is not None:
-            ground = replace(ground, time_constant=self.time_constant)
-        latency = replace(latency, command=latency.command + self.delay)
-        return replace(
-            robot,
-            base=replace(robot.base, mass=robot.base.mass + self.payload),
-            contact=replace(robot.contact, time_constant=self.time_constant),
-            reality=replace(robot.reality, ground=ground, latency=latency),
-        )
+        if robot.reality.ground.time_constant is not None:
+            robot = replace_at(robot, "reality.ground.time_constant", self.time_constant)
+        robot = replace_at(robot, "contact.time_constant", self.time_constant)
+        robot = replace_at(robot, "base.mass", robot.base.mass + self.payload)
+        delay = robot.reality.latency.command + self.delay
+        return replace_at(robot, "reality.latency.command", delay)
 
 
 def default_settings(robot: Robot) -> LiveSettings:

@@ -162,9 +162,8 @@ class EnergyShaping:
         self._clock = np.where(who, since, self._clock)
 
     def _estimate_height(self, leg: LegView) -> None:
-        start, clock = self._liftoff_height, self._clock
-        flying = equations.ballistic_height(start, self._liftoff_rate, clock)
-        self._height = np.where(self._phase == Phase.FLIGHT, flying, leg.stand)
+        thrown = equations.ballistic_height(self._liftoff_height, self._liftoff_rate, self._clock)
+        self._height = np.where(self._phase == Phase.FLIGHT, thrown, leg.stand)
 
     # What the paper's own law, or a study that asks the simulator, does otherwise.
 
