@@ -179,8 +179,8 @@ class Trainer:
         ranges = [input_range(policy, leg, heights, recipe.task.rate) for leg in legs]
         low = tuple(map(min, zip(*(least for least, _ in ranges), strict=True)))
         high = tuple(map(max, zip(*(most for _, most in ranges), strict=True)))
-        missed = run_folder.missed_commands(selected["trials"])
-        card = replace(policy.card, input_low=low, input_high=high, known_limits=missed)
+        limits = run_folder.known_limits(selected["trials"], bool(self.legs))
+        card = replace(policy.card, input_low=low, input_high=high, known_limits=limits)
         return onnx_export.with_card(content, card), selected
 
     @contextmanager
