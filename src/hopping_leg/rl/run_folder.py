@@ -116,8 +116,8 @@ def model_card(result: dict[str, Any]) -> str:
     legs = "any leg of this kind;\nthe trials below are on" if any_leg else "robot"
     dated = issubclass(OBSERVATION_HISTORIES[task["observation"]], Dated)
     age = ",\namong them the age of each joint sample, which the paper's 15 lack" if dated else ""
-    steps, minutes, tried = selected["steps"], selected["minutes"], len(result["history"])
-    chosen = f"- Selected after {steps} steps ({minutes:.1f} min), of {tried} snapshots.\n"
+    steps, took, tried = selected["steps"], selected["minutes"], len(result["history"])
+    chosen = f"- Selection: the policy after {steps} steps ({took:.1f} min) of {tried} snapshots.\n"
     limits = "".join(f"\n{limit}\n" for limit in known_limits(selected["trials"], any_leg))
     return f"""# Policy `{result["recipe"]}`, seed {result["seed"]}
 
@@ -152,14 +152,14 @@ def _row(trial: dict[str, Any]) -> str:
 
 
 def known_limits(trials: list[dict[str, Any]], any_leg: bool) -> tuple[str, ...]:
-    """Return sentences: commands missed in its own simulation, what no leg of it is like."""
+    """Return sentences on commands missed in its own simulation and on what training never met."""
     missed = [
         f"{command:g} m ({'no hops' if error is None else f'{1000 * error:+.0f} mm'})"
         for command, error in ((t["command_m"], t["median_error_m"]) for t in trials)
         if error is None or abs(error) > MISSED
     ]
-    own = [f"Commands missed in its own simulation: {', '.join(missed)}; train longer."]
-    return (*(own if missed else ()), *((NOT_MET,) if any_leg else ()))
+    own = f"Commands missed in its own simulation: {', '.join(missed)}; not for any other leg."
+    return (*((own,) if missed else ()), *((NOT_MET,) if any_leg else ()))
 
 
 def _mm(metres: float | None) -> str:
