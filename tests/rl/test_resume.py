@@ -39,8 +39,11 @@ def test_a_killed_training_ends_with_the_same_policy(name, tmp_path, monkeypatch
     with pytest.raises(KilledError):
         module.train(recipe, ROBOT, 0, tmp_path / "cut", quiet=True)
     monkeypatch.setattr(module, "Trainer", trainer)
+    before = read_checkpoint(list_checkpoints(tmp_path / "cut/checkpoints")[-1])["seconds"][1]
     cut = module.train(recipe, ROBOT, 0, tmp_path / "cut", quiet=True, resume=True)
     assert cut.read_bytes() == whole.read_bytes()
+    result = module.run_folder.read_result(cut.parent)
+    assert result["seconds"]["rollouts"] > before["rollouts"] > 0
 
 
 @pytest.mark.slow

@@ -111,7 +111,7 @@ class Trainer:
             self.learner.remaining = lambda: max(0.0, 1 - self._spent)
         self.selection = Selection(recipe, robot, folder.path / "snapshots")
         self.seconds: dict[str, float] = {"before the first rollout": time.monotonic() - began}
-        """Time spent on each part since the run began or was resumed."""
+        """Time spent on each part beside the learner's, pauses excluded, s."""
         self._earlier, self._began, self._saved = 0.0, began, time.monotonic()
         self._prepared = 0.0
         self._progress, self._title = progress, f"{recipe.name} seed {seed}"
@@ -132,6 +132,9 @@ class Trainer:
             self.learner.restore(tree["learner"])
             self.selection.rows, self._earlier = tree["history"], float(tree["elapsed"])
             self._prepared = float(tree["prepared"])
+            parts = zip((self.seconds, self.learner.seconds), tree["seconds"], strict=True)
+            for now, before in parts:
+                now.update({part: now.get(part, 0.0) + before[part] for part in before})
         except (AttributeError, LookupError, RuntimeError, TypeError, ValueError) as error:
             raise errors.UsageError(
                 f"{self.folder.path} was begun by another version; train anew in another folder."
@@ -159,8 +162,7 @@ class Trainer:
             "seconds": self.seconds | learner.seconds,
         }
         write_json(self.folder.path / "result.json", result)
-        card = run_folder.model_card(result).encode()
-        write_atomically(self.folder.path / "model_card.md", card)
+        write_atomically(self.folder.path / "model_card.md", run_folder.model_card(result).encode())
         Policy(content, "the selected policy", self.recipe.name).save(self.folder.policy)
         return self.folder.policy
 
@@ -197,9 +199,8 @@ class Trainer:
 
     def _at_boundary(self) -> None:
         self._show()
-        learner = self.learner
-        due = learner.num_timesteps >= self.selection.next_at
-        if due and learner.share >= self.recipe.selection.eval_start:
+        due = self.learner.num_timesteps >= self.selection.next_at
+        if due and self.learner.share >= self.recipe.selection.eval_start:
             self._evaluate()
         if time.monotonic() - self._saved >= self.recipe.schedule.checkpoint_seconds:
             self.checkpoint()
@@ -211,6 +212,7 @@ class Trainer:
             "history": self.selection.rows,
             "elapsed": self.elapsed,
             "prepared": self._prepared,
+            "seconds": (self.seconds, self.learner.seconds),
         }
         write_checkpoint(self.folder.checkpoints, self.learner.num_timesteps, tree)
         self._saved = time.monotonic()
