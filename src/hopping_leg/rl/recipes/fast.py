@@ -25,17 +25,11 @@ FAST = recipe.Recipe(
         random_episode_start=True,
     ),
     algorithm=DaggerConfig(
-        learning_rate=3e-3,
-        n_steps=32,
-        gradient_steps=32,
-        batch_size=1024,
-        planning=COARSE,
+        learning_rate=3e-3, n_steps=32, gradient_steps=32, batch_size=1024, planning=COARSE
     ),
     network=StudentConfig(hidden=(128, 64)),
     schedule=recipe.Schedule(num_envs=256, steps=300_000, log_every=8),
     selection=recipe.SelectionConfig(
-        eval_every=10**9,
-        eval_commands=(0.22, 0.26, 0.30, 0.34, 0.38, 0.42),
-        calibrations=2,
+        eval_every=10**9, eval_commands=(0.22, 0.26, 0.30, 0.34, 0.38, 0.42), calibrations=2
     ),
 )

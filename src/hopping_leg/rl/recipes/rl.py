@@ -28,8 +28,6 @@ RL = recipe.Recipe(
     network=NetworkConfig(actor=(64, 64), critic=(64, 64)),
     schedule=recipe.Schedule(num_envs=1024, steps=8_000_000, log_every=8),
     selection=recipe.SelectionConfig(
-        eval_every=10**9,
-        eval_commands=(0.22, 0.26, 0.30, 0.34, 0.38),
-        calibrations=3,
+        eval_every=10**9, eval_commands=(0.22, 0.26, 0.30, 0.34, 0.38), calibrations=3
     ),
 )
