@@ -17,10 +17,12 @@ RESULTS = (
     "--out runs/zero-shot-twins --json studies/sim_to_real/results/zero_shot_twins.json",
     "python -m studies.time_to_accuracy --recipes universal --seeds 0 1 2 "
     "--out runs/time_to_accuracy && "
+    "hop train --recipe universal-small --threads 2 --seed 0 --out runs/small && cd runs/small && "
+    "python ../../examples/microcontroller.py policy.onnx && cd ../.. && "
     "python -m studies.sim_to_real zero-shot --controllers universal "
     "runs/time_to_accuracy/universal-1/1/policy.onnx "
-    "runs/time_to_accuracy/universal-2/1/policy.onnx energy-shaping --twins 20 --seed 7000 "
-    "--disturbance off --jobs 2 --out runs/zero-shot-seeds "
+    "runs/time_to_accuracy/universal-2/1/policy.onnx runs/small/small.onnx energy-shaping-tuned "
+    "--twins 20 --seed 7000 --jobs 2 --out runs/zero-shot-seeds "
     "--json studies/sim_to_real/results/zero_shot_seeds.json",
     "hop robots draw legs --count 50 --seed 6000 --out runs/legs && "
     "python -m studies.sim_to_real zero-shot --controllers universal energy-shaping-tuned "
@@ -34,7 +36,7 @@ RESULTS = (
     ),
     *(
         "python -m studies.sim_to_real transfer --methods identified-belt identified two-pass cad "
-        "table-1 randomised energy-shaping-identified universal universal-identified --seeds 0 1 2 "
+        "table-1 randomised energy-shaping-identified --seeds 0 1 2 "
         f"--disturbance {noise} --jobs 2 --folder runs/transfer-fast "
         f"--json studies/sim_to_real/results/fast_noise_{noise}.json"
         for noise in ("on", "off")

@@ -49,7 +49,7 @@ def some_legs(count=4):
     for seed in range(count):
         drawn = draw_any_leg(seed)
         height = drawn.true.straight_height
-        found.append(TaskLeg(drawn.believed, drawn.true, (0.9 * height, height), drawn.disturbed))
+        found.append(TaskLeg(drawn.believed, drawn.true, (0.9 * height, height)))
     return found
 
 

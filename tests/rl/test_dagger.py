@@ -6,6 +6,7 @@ import torch
 
 from hopping_leg.envs.hidden_state import OF_MOTION
 from hopping_leg.rl.dagger import DaggerConfig
+from hopping_leg.rl.recipes import RECIPES
 from hopping_leg.sim import Measurement, leg_simulator
 from tests.rl.learners import (
     ROBOT,
@@ -170,8 +171,13 @@ def test_a_policy_for_any_leg_acts_on_each_as_the_student_did():
     assert np.ptp(memory[:, -1].numpy()) > 1e-3, "commands are corrected, each leg's by its own"
 
 
+def test_the_small_network_leaves_room_for_its_card_in_60_kb_at_8_bits():
+    made = learner(TINY_UNIVERSAL.replace(network=RECIPES["universal-small"].network))
+    assert sum(values.numel() for values in made.student.parameters()) < 50_000
+
+
 def test_a_push_counts_more_and_what_is_hidden_is_guessed():
-    made = learn(learner(TINY_UNIVERSAL), 16 * 32 * 6)
+    made = learn(learner(TINY_UNIVERSAL.replace(buffer_size=4096)), 16 * 32 * 6)
     state = {k: np.asarray(v) for k, v in made._buffer.state().items()}
     config = TINY_UNIVERSAL.algorithm
     assert set(np.unique(state["weights"])) == {1.0, config.push_weight, config.fold_weight}

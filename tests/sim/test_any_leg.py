@@ -45,6 +45,9 @@ def test_what_is_told_leaves_out_gains_delay_and_transmission():
     assert all(robot.reality == NO_MISMATCH for robot in told)
     assert {robot.hip.torque_gain for robot in told} == {1.0}
     assert all(leg.believed.thigh.length == leg.true.thigh.length for leg in DRAWN)
+    gains = [leg.true.hip.torque_gain for leg in DRAWN]
+    assert 0.42 <= min(gains) < 0.6
+    assert max(gains) > 1.2
     heavier = np.array([leg.true.base.mass / leg.believed.base.mass for leg in DRAWN])
     assert heavier.min() < 0.8
     assert heavier.max() > 1.4

@@ -29,8 +29,8 @@ class Options:
 
     recipe: str = "fast"
     """Recipe: `rl` for reinforcement learning from nothing, `fast` for imitation of a teacher,
-    `universal` for one policy on any leg, `paper` for the paper's method; or FILE.py:NAME, a recipe
-    of your own."""
+    `universal` (or `universal-small`, for a microcontroller) for one policy on any leg, `paper` for
+    the paper's method; or FILE.py:NAME, a recipe of your own."""
     robot: str | None = None
     """A shipped robot or the path of a .toml file; default: legv2-paper for `paper`, legv2 for
     `universal`, which is trained on other legs besides, else legv2-identified."""

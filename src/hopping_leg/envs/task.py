@@ -114,8 +114,7 @@ class HoppingTask(Stateful):
         options, count = self.options, self.count
         legs = self.task_legs or (TaskLeg(robot, robot, options.command_bounds),) * count
         self._ranges = np.array([leg.command_range for leg in legs])
-        disturbed = np.array([leg.disturbed for leg in legs])
-        self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise, disturbed)
+        self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise)
         self.believed = tuple(leg.believed for leg in legs)
         """What is told of each leg."""
         self.full_torque = np.array([options.action_torque] * count, np.float64)

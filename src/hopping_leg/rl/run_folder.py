@@ -13,7 +13,7 @@ from hopping_leg.locks import FOLDER_LOCK
 from hopping_leg.rl import checkpoint
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot import TIMESTEP, Robot, robot_text, robot_tree, shipped_robots
-from hopping_leg.sim.any_leg import GAINS, GROUND, TRANSMISSIONS
+from hopping_leg.sim.any_leg import GROUND, TRANSMISSIONS, WEAK
 
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "onnxruntime", "stable-baselines3", "torch")
 
@@ -26,7 +26,7 @@ MISSED = 0.02
 NOT_MET = (
     "Not met in training: loads that slosh or swing, wrong homing, links that are longer or shorter"
     f" than told, knees with less than {TRANSMISSIONS[3].low:g} N m/rad (leg V2's size), ground"
-    f" slower than {GROUND[0].high:g} s, motors with less than {100 * GAINS[0].low:.0f} % torque."
+    f" slower than {GROUND[0].high:g} s, hips with less than {100 * WEAK[0].low:.0f} % torque."
 )
 """What a policy for any leg has not learned."""
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hopping_leg.arrays import Array, BoolArray, IntArray, Stateful
+from hopping_leg.arrays import Array, IntArray, Stateful
 from hopping_leg.errors import UsageError
 from hopping_leg.sim.compiled import compiled
 
@@ -74,8 +74,7 @@ class Channel(Stateful):
 
     Every tick calls ``samples``, then ``actuate`` once. Noisy samples enter a buffer of the last
     ten ticks; with probability 0.5 three of them, in order of time, replace the latest three.
-    ``period`` is the control period, s. Legs that are not ``disturbed``, (n,), have no noise and no
-    delay.
+    ``period`` is the control period, s.
     """
 
     STATE = ("_buffer", "_draws", "_torque_noise", "_tick", "rng")
@@ -86,10 +85,8 @@ class Channel(Stateful):
         disturbance: NoiseAndDelay,
         period: float,
         rng: np.random.Generator,
-        disturbed: BoolArray | None = None,
     ) -> None:
         self.count, self.disturbance, self.period, self.rng = count, disturbance, period, rng
-        self._share = np.ones(count) if disturbed is None else disturbed.astype(np.float64)
         depth = disturbance.delay_buffer
         self._orders = np.array(list(itertools.combinations(range(depth), SAMPLES)))
         self._buffer = np.zeros((depth, count, 5))
@@ -125,7 +122,7 @@ class Channel(Stateful):
         samples, disturbance = np.empty((self.count, SAMPLES, 5)), self.disturbance
         _disturb(
             self._draws, self._buffer, self._orders, self._tick, disturbance.joint_noise,
-            disturbance.delay_probability, self._share, samples, self._back,
+            disturbance.delay_probability, samples, self._back,
         )  # fmt: skip
         return samples
 
@@ -144,7 +141,7 @@ class Channel(Stateful):
 
     def _draw(self) -> None:
         self.rng.random(out=self._draws)
-        noise = self.disturbance.torque_noise * self._share[:, None]
+        noise = self.disturbance.torque_noise
         self._torque_noise = 1 + noise * (2 * self._draws[..., 6:8] - 1)
 
 
@@ -156,7 +153,6 @@ def _disturb(
     tick: int,
     joint_noise: float,
     delay_probability: float,
-    share: Array,
     samples: Array,
     back: Array,
 ) -> None:
@@ -168,9 +164,9 @@ def _disturb(
     for leg, draw in enumerate(draws[tick % len(draws)]):
         newest = buffer[tick % depth, leg]
         for i in range(4):
-            newest[i] *= 1 + share[leg] * joint_noise * (2 * draw[i] - 1)
+            newest[i] *= 1 + joint_noise * (2 * draw[i] - 1)
         order = orders[int(draw[5] * len(orders))]
-        late = draw[4] < share[leg] * delay_probability
+        late = draw[4] < delay_probability
         for k in range(SAMPLES):
             ticks = order[k] if late else k
             back[leg, k] = ticks

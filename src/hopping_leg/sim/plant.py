@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.arrays import Array
 from hopping_leg.robot import Robot, SoftLimits
 from hopping_leg.sim.channel import Channel, Measurement, NoiseAndDelay
 from hopping_leg.sim.compiled import compiled
@@ -50,8 +50,6 @@ class Plant:
     on the robot; what they add goes through the torque noise and the limits with the rest. Every
     tick calls ``sense`` or ``samples``, then ``drive``.
 
-    Where given, ``disturbed``, (n,), says which legs the disturbance meets.
-
     ``soft_limit_torque`` is what they added in the last tick, before noise and limits, N m, (n, 2).
     """
 
@@ -61,10 +59,9 @@ class Plant:
         disturbance: NoiseAndDelay,
         soft_limits: SoftLimits | None,
         rng: np.random.Generator,
-        disturbed: BoolArray | None = None,
     ) -> None:
         self.legs = legs
-        self.channel = Channel(legs.count, disturbance, legs.period, rng, disturbed)
+        self.channel = Channel(legs.count, disturbance, legs.period, rng)
         legs.rng = rng.spawn(1)[0]
         self._limiter = SoftLimiter(legs.robot, soft_limits) if soft_limits else None
         self._samples: Array = np.empty((0, 3, 5))

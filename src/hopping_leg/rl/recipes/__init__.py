@@ -14,9 +14,9 @@ from hopping_leg.rl.recipes import fast, paper, rl, universal
 from hopping_leg.rl.students import StudentConfig
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, Range
 
-RECIPES: Mapping[str, Recipe] = {
-    recipe.name: recipe for recipe in (rl.RL, fast.FAST, paper.PAPER, universal.UNIVERSAL)
-}
+_ALL = (rl.RL, fast.FAST, paper.PAPER, universal.UNIVERSAL, universal.SMALL)
+
+RECIPES: Mapping[str, Recipe] = {recipe.name: recipe for recipe in _ALL}
 """Every recipe that ``hop train`` knows."""
 
 Randomise = Literal["none", "twins", "surprises"]

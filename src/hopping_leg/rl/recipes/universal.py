@@ -16,6 +16,14 @@ from hopping_leg.rl.dagger import DaggerConfig
 from hopping_leg.rl.recipes.fast import COARSE, FAST
 from hopping_leg.rl.students import StudentConfig
 
+STEADY = HopShape(
+    flight_length=0.76, clearance=0.23, knee_gap=0.06, squat=0.58, squat_per_drop=0.11, taper=0.05,
+    liftoff=0.926, liftoff_per_drop=0.06, least_push=0.13, braking=1.1, fold=-0.4, slew=0.65,
+)  # fmt: skip
+"""Hops that scatter little where torques are noisy, though their push is planned once: so found by
+CMA-ES on ``legv2-identified`` and twins of seeds 9300, 9301 and 9303, with ``slew`` then raised
+until no leg touched the ground with its body at 0.42 m."""
+
 UNIVERSAL = recipe.Recipe(
     name="universal",
     task=replace(
@@ -40,15 +48,17 @@ UNIVERSAL = recipe.Recipe(
         impulse=0.5,
         outlier=0.15,
         hidden_weight=0.3,
-        teacher=HopShape(fold=-0.4, knee_gap=0.06),
+        teacher=STEADY,
         planning=COARSE,
     ),
     network=StudentConfig(memory="gru", hidden=(192,), size=192, update_every=4, correction=0.01),
-    schedule=recipe.Schedule(num_envs=1024, steps=75_000_000, log_every=8),
+    schedule=recipe.Schedule(num_envs=1024, steps=60_000_000, log_every=8),
     selection=recipe.SelectionConfig(
-        eval_every=10**9,
-        eval_commands=(0.22, 0.26, 0.30, 0.34, 0.38, 0.40),
+        eval_every=10**9, eval_commands=(0.22, 0.26, 0.30, 0.34, 0.38, 0.40)
     ),
     legs="any",
     robot="legv2",
 )
+
+SMALL = UNIVERSAL.replace(name="universal-small", hidden=(64,), size=64)
+"""With a network that fits a microcontroller, its weights in 8 bits."""
