@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers import robot_numbers
-from hopping_leg.envs import HoppingTask, Reward, TaskConfig, TaskLeg, paper_reward
+from hopping_leg.envs import HoppingTask, Reward, TaskConfig, paper_reward
 from hopping_leg.envs.apex_reward import ballistic_apex
 from hopping_leg.envs.observation import sample_scaling
 from hopping_leg.errors import UsageError
@@ -171,11 +171,8 @@ ANY = TaskConfig(
 
 
 def legs_of_any_size(count=5):
-    drawn = [draw_any_leg(seed) for seed in range(count)]
-    return [
-        TaskLeg(leg.believed, leg.true, (0.3 + 0.1 * k, 0.35 + 0.1 * k))
-        for k, leg in enumerate(drawn)
-    ]
+    drawn = enumerate(map(draw_any_leg, range(count)))
+    return [replace(leg, command_range=(0.3 + 0.1 * k, 0.35 + 0.1 * k)) for k, leg in drawn]
 
 
 def mixed(seed=0):

@@ -1,10 +1,11 @@
 """Small recipes that train in a second."""
 
+from dataclasses import replace
+
 import torch
 from stable_baselines3.common.logger import configure
 
 from hopping_leg.controllers.policy import Card, Policy
-from hopping_leg.envs import TaskLeg
 from hopping_leg.rl import policy_evaluation
 from hopping_leg.rl.onnx_export import build_policy
 from hopping_leg.rl.recipes.fast import FAST
@@ -45,12 +46,8 @@ TINY_UNIVERSAL = UNIVERSAL.replace(
 
 def some_legs(count=4):
     """Return drawn legs that are asked for what about any of them reaches."""
-    found = []
-    for seed in range(count):
-        drawn = draw_any_leg(seed)
-        height = drawn.true.straight_height
-        found.append(TaskLeg(drawn.believed, drawn.true, (0.9 * height, height)))
-    return found
+    drawn = map(draw_any_leg, range(count))
+    return [replace(leg, command_range=(0.9 * (h := leg.true.straight_height), h)) for leg in drawn]
 
 
 def learner(recipe, seed=3, robot=ROBOT):

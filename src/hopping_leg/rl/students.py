@@ -209,7 +209,7 @@ class RecurrentStudent(Student):
             before = before + due * (updated[0] - before)
         known = self.layers(torch.cat([before, seen], dim=-1))
         if self.guess is not None and self.correction:
-            missed = self.guess(known)[:, MISSED : MISSED + 1] / ERROR_GAIN
+            missed = self.guess(known)[:, MISSED, None] * (1 / ERROR_GAIN)
             shift = shift + self.correction * due * (missed - shift)
             shift = shift.clamp(-_MOST_SHIFT, _MOST_SHIFT)
         count = count + 1 - self.every * (count - self.every + 2).clamp(0, 1)
