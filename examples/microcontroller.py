@@ -20,9 +20,9 @@ import hopping_leg
 policies = Path(hopping_leg.__file__).parent / "policies"
 policy = Path(sys.argv[1]) if len(sys.argv) > 1 else policies / "rl.onnx"
 graph = (model := onnx.load(policy)).graph
-for weights in [entry for entry in graph.initializer if np.prod(entry.dims) > 500]:
+for weights in [w for w in graph.initializer if len(w.dims) > 1 and np.prod(w.dims) > 500]:
     values, axis = numpy_helper.to_array(weights), len(weights.dims) - 2
-    scale = np.abs(values).max(axis=-1, keepdims=True) / 127  # of each row
+    scale = np.abs(values).max(axis=-1, keepdims=True, initial=1e-9) / 127  # of each row
     parts = {"int8": np.round(values / scale).astype(np.int8), "scale": scale.ravel()}
     names = [f"{weights.name}.{part}" for part in parts]
     graph.initializer.remove(weights)

@@ -12,8 +12,8 @@ CEILINGS = {
     "src/hopping_leg/emulator/**/*.py": (14, 1798), "src/hopping_leg/envs/**/*.py": (10, 1415),
     "src/hopping_leg/evaluate/**/*.py": (13, 1965), "src/hopping_leg/formats/**/*.py": (1, 185),
     "src/hopping_leg/identify/**/*.py": (21, 4349), "src/hopping_leg/rl/**/*.py": (19, 2805),
-    "src/hopping_leg/robot/**/*.py": (13, 1980), "src/hopping_leg/sim/**/*.py": (11, 2520),
-    "src/hopping_leg/viewer/**/*.py": (6, 950), "src/**/*.py": (176, 26789),
+    "src/hopping_leg/robot/**/*.py": (13, 1980), "src/hopping_leg/sim/**/*.py": (11, 2514),
+    "src/hopping_leg/viewer/**/*.py": (6, 950), "src/**/*.py": (176, 26785),
     "tests/**/*.py": (136, 14220), "studies/**/*.py": (73, 7690), "docs/**/*.md": (22, 2500),
     "docs/live/*.js": (13, 1490),
 }  # fmt: skip

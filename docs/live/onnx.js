@@ -175,7 +175,7 @@ const OPERATORS = {
   Elu: each((x) => (x > 0 ? x : Math.expm1(x))),
   Flatten: same,
   GRU: gru,
-  Gather(a, places) { return [this.axis === 1 ? Float32Array.from(places, (at) => a[at]) : a]; },
+  Gather(a, at) { return [Math.abs(this.axis) === 1 ? Float32Array.from(at, (i) => a[i]) : a]; },
   Gemm(x, weight, bias) { return gemm(x, weight, bias, this.transB); },
   MatMul: (x, weight) => gemm(x, weight),
   Mul: paired((a, b) => a * b),

@@ -37,8 +37,8 @@ class Experiment:
     methods: tuple[str, ...] = DEFAULT
     """What policies are trained on, the others being compared with the first. Valid: identified,
     identified-belt, two-pass, cad, table-1, truth, randomised, whose legs differ in training; and,
-    not trained, energy-shaping-identified, universal, universal-identified. energy-shaping and
-    energy-shaping-tuned hop beside them."""
+    not trained, energy-shaping-identified. energy-shaping and energy-shaping-tuned hop beside
+    them."""
     seeds: tuple[int, ...] = (0,)
     """Seeds of the trainings, one of each method and twin each."""
     recipe: str = "fast"

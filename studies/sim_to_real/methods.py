@@ -63,13 +63,6 @@ METHODS = {
             untrained=ENERGY_SHAPING,
             tuned=True,
         ),
-        Method("universal", "`universal`, told the CAD's robot", untrained="universal"),
-        Method(
-            "universal-identified",
-            "`universal`, told what both recordings identify",
-            fit="identified",
-            untrained="universal",
-        ),
     )
 }
 """Every method by name."""

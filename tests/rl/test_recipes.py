@@ -83,6 +83,6 @@ def test_a_card_names_every_command_that_its_own_simulation_misses_and_what_no_l
         return known_limits(rows, any_leg)
 
     (told,) = said(_225=0.235, _250=0.004, _300=-0.021, _350=None)
-    assert "0.225 m (+235 mm), 0.3 m (-21 mm), 0.35 m (no hops)" in told
+    assert told.split(": ")[1].startswith("0.225 m (+235 mm), 0.3 m (-21 mm), 0.35 m (no hops);")
     assert said(_220=0.0, _250=MISSED, _300=-MISSED) == ()
     assert load_controller("universal", LEGS[0]).card.known_limits == said(any_leg=True)

@@ -20,9 +20,9 @@ STEADY = HopShape(
     flight_length=0.76, clearance=0.23, knee_gap=0.06, squat=0.58, squat_per_drop=0.11, taper=0.05,
     liftoff=0.926, liftoff_per_drop=0.06, least_push=0.13, braking=1.1, fold=-0.4, slew=0.65,
 )  # fmt: skip
-"""Hops that scatter little where torques are noisy, though their push is planned once: so found by
-CMA-ES on ``legv2-identified`` and twins of seeds 9300, 9301 and 9303, with ``slew`` then raised
-until no leg touched the ground with its body at 0.42 m."""
+"""Hops that scatter little where torques are noisy, though their push is planned once: found by
+CMA-ES on ``legv2-identified`` and twins of seeds 9300, 9301 and 9303; a smaller ``slew`` lets the
+body touch the ground at 0.42 m."""
 
 UNIVERSAL = recipe.Recipe(
     name="universal",
